@@ -12,7 +12,6 @@ from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
 
 from .errors import GlskError, InvalidCloudError, InvalidParameterError, StageError, did_you_mean
 from .interop.clouds import Cloud, cloud_points
-from .interop.packages import following_open3d
 from .parameters import UNWRITTEN, Parameters
 from .points import Points
 from .report import STOPPED_BY_CALLER, IterationRecord, Report, warn
@@ -98,12 +97,11 @@ class Filter(Parameters, Generic[Produced]):
         if not (_is_of(data, self.consumes) or (_is_of(data, Cloud) and self.takes_clouds())):
             raise StageError(f"{name} takes a {_named(self.consumes)}, not a {type(data).__name__}: {ORDER}")
         start = time.perf_counter()
-        with following_open3d():
-            if self.consumes is Points and not isinstance(data, Points):
-                data = Points.of(data)
-            result = self._ran(data, _watch(on_iteration, on_state))
-            seconds = time.perf_counter() - start
-            _log.debug("%s took %.3f s: %r", name, seconds, result)
+        if self.consumes is Points and not isinstance(data, Points):
+            data = Points.of(data)
+        result = self._ran(data, _watch(on_iteration, on_state))
+        seconds = time.perf_counter() - start
+        _log.debug("%s took %.3f s: %r", name, seconds, result)
         if result is None or not _is_of(result, self.produces):
             raise StageError(f"{name} should give a {_named(self.produces)} and gave a {type(result).__name__}")
         if self.produces is not Cloud:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import logging
 import os
 import shutil
+import signal
+import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 from .. import __version__
 from ..errors import BatchError, InvalidParameterError
 from ..interop.atomic import write_json
-from ..interop.interrupts import counted_interrupts
 from ..numerics.cores import cores
 from ..parameters import check_number
 from .ledger import DONE, FAILED, LEDGER_COLUMNS, LOCK_FILE, STALE, Row, locked, refuse_ways_out
@@ -216,6 +217,20 @@ def _remove_parts(plan: Plan) -> None:
                 Path(task.path).parent.rmdir()
 
 
+@contextmanager
+def _counted_interrupts() -> Iterator[list[int]]:
+    """Count Ctrl-C in a list instead of being torn out of the block by it; outside the main thread none comes."""
+    pressed: list[int] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield pressed
+        return
+    before = signal.signal(signal.SIGINT, lambda number, frame: pressed.append(number))
+    try:
+        yield pressed
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 class _Run:
     """A batch at work. Scenes are joined when all tiles are done."""
 
@@ -227,7 +242,7 @@ class _Run:
     def work_through(self) -> None:
         """Hand out all tasks. Ctrl-C hands out no more and waits for what is in work; the second one does not wait."""
         todo = self._plan.todo
-        with counted_interrupts() as self._interrupts:  # no line of the ledger is torn
+        with _counted_interrupts() as self._interrupts:  # no line of the ledger is torn
             self._do([task for task in todo if not task.needs])
             self._do([task for task in todo if task.needs and self._has_all_tiles(task)])
 

@@ -45,7 +45,7 @@ WITHOUT_JSON = (convert, rig, view, demo)
 def add_plugged(app: typer.Typer) -> None:
     """Add the commands of other distributions; the benchmark says how to get it where it is not there."""
     problems: list[str] = []
-    found = {entry.name: entry for _, entry in entry_points(COMMAND_GROUP, problems)}
+    found = {entry.name: entry for entry in entry_points(COMMAND_GROUP, problems)}
     for name, entry in sorted(found.items()):
         try:
             plugged = entry.load()

@@ -168,7 +168,7 @@ def cross_check(
         raise InvalidParameterError(f"max_points = {max_points!r}: {words}")
     pipeline.check()
     pipeline.check_complete()
-    require("igl", "libigl")  # before the work that it is for
+    require("igl")  # before the work that it is for
     given = cloud_points(cloud)
     points = _thinned(given, max_points)
     rings = kinds.index(RingBuilder) + 1
@@ -254,7 +254,7 @@ def save_crosscheck_picture(
 
 
 def _drawn(check, size, title):
-    figure = figures.new_figure(size)
+    figure = figures.new_figure(np.divide(size, figures.DPI))
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.collections import LineCollection
@@ -280,7 +280,10 @@ def _drawn(check, size, title):
     height = figure.get_figheight()
     _write(figure, check, title, height)
     box = [0.42, 0.3 / height, 0.16, 0.09 / height]
-    figures.colour_bar(figure, scale, box, [0, 30, 60], ["0", "30", "60\N{DEGREE SIGN} and more"])
+    bar = figure.colorbar(scale, cax=figure.add_axes(box), orientation="horizontal")
+    bar.set_ticks([0, 30, 60], labels=["0", "30", "60\N{DEGREE SIGN} and more"])
+    bar.outline.set_visible(False)
+    bar.ax.tick_params(length=0, pad=2, labelsize=7, labelcolor=figures.INK)
     return figure
 
 

@@ -54,7 +54,7 @@ def forget_plugins() -> None:
 def _load(group, builtin, check, found):
     """Fill `found` with plugins; gives what is wrong with the others."""
     problems: list[str] = []
-    for distribution, entry in entry_points(group, problems):
+    for entry in entry_points(group, problems):
         try:
             if entry.name in builtin or entry.name in found:
                 owner = "the built-in one" if entry.name in builtin else "one of another plugin"
@@ -67,7 +67,8 @@ def _load(group, builtin, check, found):
             raise
         except BaseException as error:  # whatever code of others raises; some is no Exception
             cause = str(error) if isinstance(error, _Unfit) else f"{type(error).__name__}: {error}"
-            problems.append(f"plugin {entry.name!r} ({entry.value}) of {distribution} left out: {cause}")
+            package = f"{entry.dist.name} {entry.dist.version}" if entry.dist else "an unknown package"
+            problems.append(f"plugin {entry.name!r} ({entry.value}) of {package} left out: {cause}")
     return problems
 
 

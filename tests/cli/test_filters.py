@@ -76,7 +76,7 @@ def glsk(monkeypatch):
 
     def run(*words, entries=None):
         if entries is not None:
-            found = [("some 1", EntryPoint(name, value, main.COMMAND_GROUP)) for name, value in entries.items()]
+            found = [EntryPoint(name, value, main.COMMAND_GROUP) for name, value in entries.items()]
             monkeypatch.setattr(main, "entry_points", lambda group, problems: found)
         app = typer.Typer()
         app.command("own")(lambda: None)
@@ -109,8 +109,6 @@ def test_what_is_broken_or_no_application_is_left_out(glsk, capsys, value):
 
 
 def test_a_malformed_file_of_another_distribution_stops_no_command(glsk, install, capsys):
-    install("glsk-odd", "1", "", "[glsk_o3d.commands\nx = json:dumps\n")
+    install("glsk-odd", "1", "", "[glsk_o3d.commands]\nno equals sign\n")
     assert glsk("own").exit_code == 0
-    warning = capsys.readouterr().err
-    assert warning.count("\n") == 1
-    assert warning.startswith("glsk: warning: the plugins of glsk-odd left out: its entry_points.txt is malformed: ")
+    assert capsys.readouterr().err.startswith("glsk: warning: all plugins left out: ")

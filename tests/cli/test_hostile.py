@@ -50,7 +50,6 @@ def test_whatever_prints(capfd):
         ["info", "bad\x1b[2J.json"],
         ["info", "--where", "x\x1b[31m > 3", "s\x1b]0;t\x07.xyz"],
         ["run", "bad\x1b[2J.mlx", "s\x1b]0;t\x07.xyz", "-o", "o.ply"],
-        ["batch", ".", "-o", "../out\x1b[31m", "--dry-run"],
         ["filters", "no\x1b[31m"],
     ],
 )

@@ -87,13 +87,10 @@ def test_where_settings_go():
     assert find(after, "Contractor").reducer.phi == 1e4
     assert find(after, "Contractor").stop.threshold == 0.01
     assert before == default()
-    settings = ["RingSizeRatio.threshold=0.5", "Contractor.stop=RingSizeRatio"]  # in any order
-    assert override(before, settings) == override(before, settings[::-1])
     assert find(override(before, ["RingBuilder.k=9", "RingBuilder.k=10"]), "RingBuilder").k == 10
     assert override(before, ["k=24", "reducer=none"]) == before.with_options(k=24, reducer=None)
-    settings = ["threshold=0.5", "stop=RingSizeRatio", "RingSizeRatio.threshold=0.6"]
-    assert find(override(before, settings[:2]), "Contractor").stop.threshold == 0.5
-    assert find(override(before, settings), "Contractor").stop.threshold == 0.6
+    settings = ["stop=RingSizeRatio", "threshold=0.6"]  # in their order
+    assert find(override(before, settings), "Contractor").stop == RingSizeRatio(threshold=0.6)
     twice = Pipeline(RingBuilder(), Contractor(reducer=LPRReducer()), LPRReducer())
     changed = override(twice, ["LPRReducer.phi=7"])
     assert [part.phi for part in parts(changed) if isinstance(part, LPRReducer)] == [7, 7]
@@ -102,29 +99,22 @@ def test_where_settings_go():
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ("Connector.radius", "write it as Filter.parameter=value"),
+        *(
+            (word, "write it as Filter.parameter=value")
+            for word in ("", "Connector.radius", "Connector.=2%", ".radius=2%")
+        ),
         ("radius=2%", "--set radius=2%: radius: more than one part of the pipeline has it"),
-        ("radius=2%", "write 'RingBuilder.radius' or 'Connector.radius'"),
         ("max_iteration=2", "did you mean 'max_iterations'?"),
-        ("Connector.=2%", "write it as Filter.parameter=value"),
-        (".radius=2%", "write it as Filter.parameter=value"),
-        ("Connector.radius=", "write it as Filter.parameter=value"),
-        ("", "write it as Filter.parameter=value"),
         ("connector.radius=2%", "connector is not in the pipeline, which has Sampler, OutlierRemover, "),
-        ("Connector.radios=2%", "did you mean 'radius'?"),
-        ("RingBuilder.zzz=2", "no parameter of RingBuilder is called 'zzz': there are k, radius"),
         ("RingBuilder.consumes=cloud", "no parameter of RingBuilder is called 'consumes'"),
         ("Contractor.stop=RingSizeRati", "no stop is called 'RingSizeRati': did you mean 'RingSizeRatio'?"),
         ("Contractor.stop=LPRReducer", "no stop is called 'LPRReducer'"),
         ("Contractor.reducer=Contractor", "no reducer is called 'Contractor'"),
         ("Contractor.stop=none", "no stop is called 'none'"),
-        ("RingBuilder.k=1.5", "RingBuilder.k = 1.5: must be an int"),
         ("RingBuilder.k=many", "RingBuilder.k = 'many': must be an int, or 'auto', or 'published'"),
         ("LPRReducer.phi=nan", "LPRReducer.phi = nan: must be finite"),
-        ("LPRReducer.order=random", "LPRReducer.order = 'random': must be one of 'cheapest', 'index'"),
         ("LPRReducer.conserve_mass=maybe", "LPRReducer.conserve_mass = 'maybe': must be True or False"),
         ("Connector.radius=101%", "a percentage of the diagonal lies above 0% and up to 100%"),
-        ("Connector.radius=wide", "must be a number in the cloud's units or a percentage"),
     ],
 )
 def test_refuses(setting, message):

@@ -53,7 +53,7 @@ def test_identical(invoke, scans, tmp_path, made, words):
 
 def test_another_scan_and_its_recipe_from_a_file(invoke, scans, tmp_path, made):
     assert invoke("rerun", "s.npz", scans / "ring.ply", "-o", "a.json").exit_code == 0
-    words = ("skeletonize", scans / "ring.ply", "--recipe", "r.toml", "-o", "b.json")
+    words = ("skeletonize", scans / "ring.ply", "--pipeline", "r.toml", "-o", "b.json")
     result = invoke(*words, "--save-recipe", "b.toml", "--json")
     assert json.loads(result.stdout)["files"] == ["b.json", "b.toml"]
     a, b = read_skeleton(tmp_path / "a.json"), read_skeleton(tmp_path / "b.json")
@@ -84,13 +84,12 @@ def test_refused_before_anything_runs(refused, scans, tmp_path, made, no_run, mo
         (1, "rerun s.ply", "s.ply: cannot be repeated: it holds no recipe"),
         (1, "rerun gap.json", "gap.json: cannot be repeated: pipeline[1].reducer: a recipe cannot"),
         (1, "rerun gone.json", "gone.json: cannot be repeated: pipeline[0].filter: no filter is"),
-        (2, "skeletonize SCAN --recipe r.toml --save-recipe ./r.toml -o a.ply", "is an input"),
+        (2, "skeletonize SCAN --pipeline r.toml --save-recipe ./r.toml -o a.ply", "is an input"),
         (2, "skeletonize SCAN --save-recipe a.json -o a.json", "a.json: is named twice"),
         (2, "skeletonize SCAN --save-recipe a.json", "nothing to write"),
-        (2, "skeletonize SCAN --recipe r.toml --pipeline wen2024 -o a.ply", "give one of them"),
-        (1, "skeletonize SCAN --recipe none.toml -o a.ply", "none.toml: No such file"),
-        (1, "skeletonize SCAN --recipe bad.json -o a.ply", "bad.json: pipeline[0].k: must be at least"),
-        (2, "skeletonize SCAN --recipe part.json -o a.ply", "not lead from a cloud to a skeleton"),
+        (1, "skeletonize SCAN --pipeline none.toml -o a.ply", "none.toml: No such file"),
+        (1, "skeletonize SCAN --pipeline bad.json -o a.ply", "bad.json: pipeline[0].k: must be at least"),
+        (2, "skeletonize SCAN --pipeline part.json -o a.ply", "not lead from a cloud to a skeleton"),
         (1, "skeletonize SCAN --pipeline odd -o a.ply --save-recipe a.json", "pipeline[1].reducer: a recipe cannot"),
     ):
         assert message in refused(code, *words.replace("SCAN", str(scans / "sample.ply")).split())

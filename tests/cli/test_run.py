@@ -45,8 +45,7 @@ def test_a_script_of_ours_is_the_pipeline(invoke, scans, script, tmp_path):
     connector = glsk_o3d.Connector(radius=0.02 * Layer.read(scan).diagonal)
     ahead, behind = glsk_o3d.pipelines.rings(), glsk_o3d.Refiner() | glsk_o3d.Tracer()
     expected = (ahead | contractor | connector | behind)(read_cloud(scan))
-    assert f", converged after {len(expected.report.iterations)} solves\n" in result.stdout
-    assert "iterations" not in result.stdout
+    assert f", iterations {len(expected.report.iterations)}, " in result.stdout
     back = read_skeleton(tmp_path / "s.json")
     np.testing.assert_array_equal(back.vertices, expected.vertices)
     assert back.report.stages == expected.report.stages
@@ -149,12 +148,10 @@ def test_the_list_says_what_each_script_does(invoke):
     told = {each["name"]: each for each in json.loads(invoke("run", "--list", "--json").stdout)}
     assert set(told) == set(scripts()) >= {"glskeleton", "cao2010", "scan_cleanup", "scan_cleanup_then_skeleton"}
     assert all(len(each["doc"]) > 40 for each in told.values())
-    needing = {"mesh_crosscheck", "scan_cleanup", "scan_cleanup_then_skeleton"}
-    assert {name for name, each in told.items() if each["needs_pymeshlab"]} == needing
+    needing = [name for name, each in told.items() if each["needs_pymeshlab"]]
+    assert needing == ["mesh_crosscheck", "scan_cleanup", "scan_cleanup_then_skeleton"]
     lines = invoke("run", "--list").stdout.splitlines()
-    names = [line.split()[0] for line in lines if line and line[0] != " "]
-    marked = [lines[i - 1].split()[0] for i, line in enumerate(lines) if line.startswith("  needs pymeshlab")]
-    assert (names, set(marked)) == (list(told), needing)
+    assert [lines[i - 1].split()[0] for i, line in enumerate(lines) if line.startswith("  needs pymeshlab")] == needing
 
 
 def _mesh(path):

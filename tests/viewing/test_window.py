@@ -1,6 +1,5 @@
 """The window: where there is no display an error, where there is one a picture."""
 
-import socket
 import sys
 from types import SimpleNamespace
 from typing import ClassVar
@@ -29,21 +28,6 @@ def test_without_a_display(tree, monkeypatch, display):
     assert not has_display()
     with pytest.raises(DisplayError, match=r"no display .*save_report"):
         show(tree)
-
-
-@needs_x11
-@pytest.mark.usefixtures("no_display")
-def test_a_wayland_socket_counts_only_while_somebody_listens(monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)  # the names of sockets must be short
-    monkeypatch.setenv("XDG_RUNTIME_DIR", ".")
-    monkeypatch.setenv("WAYLAND_DISPLAY", "wayland-0")
-    assert not has_display()
-    with socket.socket(socket.AF_UNIX) as compositor:
-        compositor.bind("wayland-0")
-        assert not has_display()
-        compositor.listen()
-        assert has_display()
-    assert not has_display()  # though the file is still there
 
 
 @needs_x11
