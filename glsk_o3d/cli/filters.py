@@ -35,9 +35,10 @@ def filters(
     def words() -> None:
         for facts in filter_facts:
             flow = f"{facts['consumes']} -> {facts['produces']}" if facts["consumes"] else facts["kind"]
-            _print_facts(facts, flow, map(_parameter_row, facts["parameters"]))
+            _print_facts(facts, flow, map(_parameter_row, facts["parameters"]), name is not None)
         for facts in pipeline_facts:
-            _print_facts(facts, "pipeline", (("  |" if i else "", stage) for i, stage in enumerate(facts["stages"])))
+            stages = (("  |" if i else "", stage) for i, stage in enumerate(facts["stages"]))
+            _print_facts(facts, "pipeline", stages, name is not None)
 
     tell({"filters": filter_facts, "pipelines": pipeline_facts}, words)
 
@@ -91,14 +92,15 @@ def _plugin(thing) -> str | None:
 
 
 def _prose(documented) -> str:
-    """The first paragraph of the docstring, with the markup of formulas and code taken off."""
-    text = " ".join((inspect.getdoc(documented) or "").partition("\n\n")[0].split())
+    """The docstring up to its first section, a line per paragraph, with the markup of formulas and code taken off."""
+    text = re.split(r"\n\n\w[\w ]*\n-{3,}\n", inspect.getdoc(documented) or "", maxsplit=1)[0]
+    text = re.sub(r"(?<!\n)\n(?!\n)", " ", text)
     return re.sub(r":math:`([^`]*)`|``([^`]*)``|`([^`]*)`", lambda m: m[1] or m[2] or m[3], text)
 
 
-def _print_facts(facts: dict[str, Any], kind: str, rows) -> None:
+def _print_facts(facts: dict[str, Any], kind: str, rows, full: bool) -> None:
     heading(f"{facts['name']}  {kind}" + f", from {facts['plugin']}" * bool(facts["plugin"]))
-    print_table([[facts["doc"]]], wrap=True)
+    print_table([[facts["doc"] if full else facts["doc"].partition("\n\n")[0]]], wrap=True)
     print_table(rows, wrap=True)
     echo()
 

@@ -47,22 +47,6 @@ def counts(monkeypatch):
     return counts
 
 
-@pytest.mark.usefixtures("no_run", "folder")
-@pytest.mark.parametrize(
-    ("code", "words", "message"),
-    [
-        (1, "none", "none: no such file or folder"),
-        (1, ".", "sub-folders are taken with recursive"),
-        (2, "in --format stl", "unknown ending; known are .ply"),
-        (2, "in --format ,", "nothing to write"),
-        (2, "in --set Connector.radios=1", "did you mean 'radius'?"),
-        (2, "in --workers 2 --scheduler tcp://x:1", "give neither workers"),
-    ],
-)
-def test_typos_leave_nothing_behind(refused, code, words, message):
-    assert message in refused(code, "batch", *words.split(), "-o", "out")
-
-
 def test_some_fail(invoke, folder, tmp_path):
     words = ("batch", "in", "-o", "out", "--format", "ply, json", "--preview")
     result = invoke(*words)

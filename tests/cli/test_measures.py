@@ -80,29 +80,17 @@ def test_a_stem_and_why_it_has_no_diameter(invoke, tmp_path):
     assert json.loads(result.stdout)["doubts"][-1] == why
 
 
-def test_units_and_what_is_up(invoke, tmp_path, y):
-    metres = json.loads(invoke("tree", y, "--json", "--up", "z").stdout)
-    for unit, factor in {"0.001": 0.001, "mm": 0.001, "ft": 0.3048, "m": 1}.items():
-        facts = json.loads(invoke("tree", y, "--json", "--up", "z", "--unit", unit).stdout)
-        assert facts["height"] == pytest.approx(factor * metres["height"])
-        assert facts["unit"] == factor
-    assert json.loads(invoke("tree", y, "--json", "--up", "-z").stdout)["height"] != metres["height"]
-    save_skeleton(pipelines.tree("-y")(samples.y_junction(2000).points), tmp_path / "t.json")
-    for words, up in (((), "-y"), (("--root", "x"), "x"), (("--up", "z"), "z")):  # as the tree was grown, or as asked
-        assert json.loads(invoke("tree", "t.json", "--json", *words).stdout)["up"] == up
-
-
-@pytest.mark.parametrize("name", ["t.qsm.csv", "t.mat", "t.txt"])
-def test_files_of_other_programs_are_in_metres(invoke, tmp_path, y, name):
-    result = invoke("tree", y, "-o", name, "-o", "c.csv", "--unit", "mm", "--root", "z")
-    assert result.stdout.splitlines()[-2:] == [f"wrote {name}", "wrote c.csv"]
-    save_cylinders(cylinders(read_skeleton(tmp_path / y), "z"), tmp_path / f"expected-{name}", 0.001)
-    if name != "t.mat":  # which says when it was written
-        assert (tmp_path / name).read_bytes() == (tmp_path / f"expected-{name}").read_bytes()
-    else:
-        found, expected = (loadmat(tmp_path / f"{prefix}t.mat")["cylinder"][0, 0] for prefix in ("", "expected-"))
-        assert all((found[field] == expected[field]).all() for field in expected.dtype.names)
-        assert found["length"].sum() == pytest.approx(1.4e-3, rel=0.1)
+def test_units_what_is_up_and_files_of_other_programs_in_metres(invoke, tmp_path, y):
+    metres, turned = (
+        json.loads(invoke("tree", y, "--json", "--root", "z", "--up", up).stdout)["height"] for up in ("z", "-z")
+    )
+    assert turned != metres
+    result = invoke("tree", y, "-o", "t.qsm.csv", "-o", "t.mat", "--unit", "mm", "--root", "z", "--json")
+    facts = json.loads(result.stdout)
+    assert (facts["height"], facts["files"]) == (pytest.approx(0.001 * metres), ["t.qsm.csv", "t.mat"])
+    save_cylinders(cylinders(read_skeleton(tmp_path / y), "z"), tmp_path / "expected.qsm.csv", 0.001)
+    assert (tmp_path / "t.qsm.csv").read_bytes() == (tmp_path / "expected.qsm.csv").read_bytes()
+    assert loadmat(tmp_path / "t.mat")["cylinder"][0, 0]["length"].sum() == pytest.approx(1.4e-3, rel=0.1)
 
 
 def test_a_tree_taller_than_any_is_in_doubt(invoke, tmp_path, y):

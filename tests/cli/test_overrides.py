@@ -10,13 +10,9 @@ from hypothesis import strategies as st
 import glsk_o3d
 from glsk_o3d import Contractor, InvalidParameterError, LPRReducer, Pipeline, RingBuilder, RingSizeRatio
 from glsk_o3d.cli.overrides import override
-from glsk_o3d.parameters import SMALLEST_LENGTH
 from glsk_o3d.pipeline import parts
 from glsk_o3d.pipelines import PIPELINES, cao2010, default
 from glsk_o3d.recipes.catalogue import catalogue
-
-RULES = {"stop": ["ExplainedScore", "RingSizeRatio"], "reducer": ["LPRReducer"]}
-FIELDS = [(cls, field) for cls in catalogue().values() for field in dataclasses.fields(cls)]
 
 
 def find(pipeline, name):
@@ -24,44 +20,30 @@ def find(pipeline, name):
     return found
 
 
-def values(facts):
-    """Texts a user may write for a parameter, each with what it means."""
-    kind = facts["type"].rstrip("?")
-    low = facts["low"] if facts["low"] is not None else 0
-    high = facts["high"] if facts["high"] is not None else low + 1e6
-    if kind == "int":
-        plain = st.integers(int(low) + 1, int(high)).map(lambda n: (str(n), n))
-    elif kind == "float":
-        plain = st.floats(low, high, exclude_min=True).flatmap(
-            lambda x: st.sampled_from([(repr(x), x), (f"{x:.17e}", x)])
-        )
-    elif kind == "length":
-        percent = st.floats(0.001, 100).map(lambda x: (f"{x:.6f}%", f"{x:.6f}%"))
-        plain = percent | st.floats(max(low, SMALLEST_LENGTH), high).map(lambda x: (repr(x), x))
-    elif kind == "point":
-        plain = st.just(("0.5,0,-2e3", "0.5,0,-2e3"))
-    elif kind == "bool":
-        plain = st.sampled_from([("true", True), ("no", False), ("1", True), ("OFF", False)])
-    elif kind != "choice":
-        plain = st.sampled_from([(name, catalogue()[name]()) for name in RULES[kind]])
-    if facts["choices"]:  # any type may also be a word
-        words = st.sampled_from([(choice, choice) for choice in facts["choices"]])
-        plain = words if kind == "choice" else plain | words
-    return plain | st.sampled_from([("none", None), ("None", None)]) if facts["type"].endswith("?") else plain
-
-
-@pytest.mark.parametrize(("cls", "field"), FIELDS, ids=[f"{cls.__name__}.{field.name}" for cls, field in FIELDS])
-@settings(max_examples=20)
-@given(data=st.data())
-def test_every_parameter_can_be_set(cls, field, data):
-    text, value = data.draw(values(field.metadata))
-    start = default() if cls is not RingSizeRatio else cao2010()
-    changed = override(start, [f" {cls.__name__}.{field.name} = {text}"])
-    got = getattr(find(changed, cls.__name__), field.name)
-    assert got == value
-    assert type(got) is type(value)
-    before = getattr(find(start, cls.__name__), field.name)
-    assert changed.with_options({f"{cls.__name__}.{field.name}": before}) == start  # nothing else has changed
+@pytest.mark.parametrize(
+    ("setting", "name", "value"),
+    [
+        ("RingBuilder.k=16", "k", 16),
+        (" RingBuilder . k = auto ", "k", "auto"),
+        ("RingBuilder.radius=none", "radius", None),
+        ("Connector.radius=2.5%", "radius", "2.5%"),
+        ("Connector.radius=1e-3", "radius", 1e-3),
+        ("LPRReducer.phi=1e4", "phi", 1e4),
+        ("LPRReducer.order=index", "order", "index"),
+        ("LPRReducer.conserve_mass=no", "conserve_mass", False),
+        ("Sampler.drop_invalid=ON", "drop_invalid", True),
+        ("Tracer.root=0.5,0,-2e3", "root", "0.5,0,-2e3"),
+        ("Contractor.stop=RingSizeRatio", "stop", RingSizeRatio()),
+        ("Contractor.reducer=none", "reducer", None),
+    ],
+)
+def test_values_of_every_kind(setting, name, value):
+    owner = setting.partition(".")[0].strip()
+    changed = override(default(), [setting])
+    got = getattr(find(changed, owner), name)
+    assert (got, type(got)) == (value, type(value))
+    before = getattr(find(default(), owner), name)
+    assert changed.with_options({f"{owner}.{name}": before}) == default()  # nothing else has changed
 
 
 def test_round_trip_of_every_pipeline():

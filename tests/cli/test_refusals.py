@@ -6,6 +6,7 @@ import pytest
 
 from glsk_o3d import Skeleton, read_skeleton, samples, save_skeleton
 
+SCRIPT = '<FilterScript>\n<filter name="{}"/></FilterScript>'
 TABLE = """
     1 branches z.ply                                       | z.ply: no such file
     1 branches SCANS/ring.ply                              | ring.ply: is a cloud, not a skeleton: make one with
@@ -54,9 +55,45 @@ TABLE = """
     1 info bad.json                                        | bad.json: not a valid .json skeleton
     1 info bad.docx                                        | bad.docx: unknown ending
     2 view y.ply --report r.pdf                            | r.pdf: the report is a page and its name ends in .html
-    1 skeletonize y.ply -o a.ply                           | y.ply: is a skeleton, not a scan
     2 filters Contracter                                   | is called 'Contracter': did you mean 'Contractor'?
     1 demo -o y.ply                                        | y.ply: is a file, not a folder
+"""
+
+BEFORE_ANY_RUN = """
+    1 skeletonize y.ply -o a.ply                           | y.ply: is a skeleton, not a scan
+    2 skeletonize SCANS/ring.ply                           | nothing to write
+    2 skeletonize SCANS/ring.ply -o s.stl                  | s.stl: the file is a skeleton and its name ends in .ply or
+    2 skeletonize SCANS/ring.ply --preview s.jpg           | s.jpg: the picture is a PNG and its name ends in .png
+    2 skeletonize SCANS/ring.ply --report s.pdf            | s.pdf: the report is a page and its name ends in .html
+    2 skeletonize SCANS/ring.ply --tubes s.xyz             | s.xyz: the tubes are a mesh and its name ends in .ply or
+    2 skeletonize SCANS/ring.ply --labelled s.pcd          | s.pcd: the file is a cloud with labels and its name ends
+    2 skeletonize SCANS/ring.ply --save-recipe a.yaml -o a.ply | a.yaml: the file is a recipe and its name ends in
+    2 skeletonize SCANS/ring.ply -o s.ply -o ./s.ply       | s.ply: is named twice
+    2 skeletonize SCANS/ring.ply -o SCANS/ring.ply         | is an input
+    1 skeletonize SCANS/ring.ply -o no/where/s.ply         | no/where: no such folder
+    1 skeletonize SCANS/ring.ply -o /proc/s.ply            | /proc/s.ply: no file can be made in this folder
+    1 skeletonize SCANS/ring.ply -o folder.ply             | folder.ply: is a folder or a device, not a file to write to
+    2 skeletonize SCANS/ring.ply -o s.ply --pipeline wen2042 | no pipeline is called 'wen2042': did you mean 'wen2024'?
+    2 skeletonize SCANS/ring.ply -o s.ply --set radios=1   | did you mean 'radius'
+    2 skeletonize SCANS/ring.ply -o s.ply --set Connector.radius=-1 | Connector.radius = -1.0: must be above 0
+    2 skeletonize SCANS/ring.ply -o s.ply --stream --pipeline wen2024 | this pipeline takes all points of a cloud
+    1 skeletonize none.ply -o s.ply                        | none.ply: no such file
+    1 skeletonize SCANS/empty.ply -o s.ply                 | empty.ply: the file is empty
+    1 skeletonize folder.ply -o s.ply                      | folder
+    1 skeletonize SCANS/nan.ply -o s.ply                   | nan.ply: 2 of 1000 points have NaN
+    1 skeletonize none.xyz -o s.ply                        | none.xyz: none of its 20 points has finite coordinates
+    2 run                                                  | a SCRIPT and a SCAN are needed
+    2 run glskeleton SCANS/ring.ply                        | nothing to write
+    2 run glskeletn SCANS/ring.ply -o s.ply                | no filter script is called 'glskeletn': did you mean
+    1 run none.mlx SCANS/ring.ply -o s.ply                 | none.mlx: no such file
+    1 run bad.mlx SCANS/ring.ply -o s.ply                  | bad.mlx, line 2: no filter is called 'Generate Skeletn'
+    2 run glskeleton SCANS/ring.ply -o s.stl               | s.stl: unknown ending; known are .ply
+    2 run points.mlx SCANS/ring.ply -o s.json              | s.json: unknown ending for points; known are .ply, .pcd
+    1 run glskeleton y.ply -o t.json                       | the current layer (y.ply) is a skeleton or another line
+    1 batch none -o out                                    | none: no such file or folder
+    2 batch SCANS/ring.ply -o out --format stl             | unknown ending; known are .ply
+    2 batch SCANS/ring.ply -o out --format ,               | nothing to write
+    2 batch SCANS/ring.ply -o out --workers 2 --scheduler tcp://x:1 | give neither workers
 """
 
 
@@ -76,13 +113,31 @@ def files(tmp_path, y, ring_file):
     cube = o3d.geometry.TriangleMesh.create_box().translate((50, 0, 0))
     o3d.io.write_triangle_mesh(str(tmp_path / "away.ply"), cube)
     texts = {"junk.ply": "hello", "nan.xyz": "0 0 0\n0 nan 1\n", "bad.json": "{}", "bad.swc": "1 2", "bad.docx": "x"}
+    texts |= {"none.xyz": "nan nan nan\n" * 20, "bad.mlx": SCRIPT.format("Generate Skeletn")}
+    texts |= {"points.mlx": SCRIPT.format("Generate One Rings (GLSkeleton)")}
+    (tmp_path / "folder.ply").mkdir()
     for name, text in texts.items():
         (tmp_path / name).write_text(text)
 
 
-@pytest.mark.usefixtures("files")
+@pytest.fixture
+def refuses(refused, files, scans):
+    """Run the command of a line; it must fail as the line says."""
+
+    def check(line):
+        words, message = map(str.strip, line.split("|"))
+        code, *words = words.replace("SCANS", str(scans)).split()
+        assert message in refused(int(code), *words)
+
+    return check
+
+
 @pytest.mark.parametrize("line", TABLE.strip().splitlines())
-def test_refusals(refused, scans, line):
-    words, message = map(str.strip, line.split("|"))
-    code, *words = words.replace("SCANS", str(scans)).split()
-    assert message in refused(int(code), *words)
+def test_refusals(refuses, line):
+    refuses(line)
+
+
+@pytest.mark.usefixtures("no_run")
+@pytest.mark.parametrize("line", BEFORE_ANY_RUN.strip().splitlines())
+def test_refusals_cost_no_run(refuses, line):
+    refuses(line)

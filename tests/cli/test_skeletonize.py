@@ -15,48 +15,6 @@ from glsk_o3d.io.scans import read_mesh
 from glsk_o3d.pipelines import PIPELINES
 
 
-@pytest.mark.usefixtures("no_run")
-@pytest.mark.parametrize(
-    ("code", "words", "message"),
-    [
-        (2, [], "nothing to write"),
-        (2, ["-o", "s.stl"], "s.stl: the file is a skeleton and its name ends in .ply or .obj"),
-        (2, ["-o", "s.ply", "--preview", "s.jpg"], "s.jpg: the picture is a PNG and its name ends in .png"),
-        (2, ["--report", "s.pdf"], "s.pdf: the report is a page and its name ends in .html"),
-        (2, ["--tubes", "s.xyz"], "s.xyz: the tubes are a mesh and its name ends in .ply or .obj"),
-        (2, ["--labelled", "s.pcd"], "s.pcd: the file is a cloud with labels and its name ends in .ply"),
-        (2, ["--save-recipe", "a.yaml", "-o", "a.ply"], "a.yaml: the file is a recipe and its name ends in .json"),
-        (2, ["-o", "s.ply", "-o", "./s.ply"], "s.ply: is named twice"),
-        (2, ["-o", "SCAN"], "is an input"),
-        (1, ["-o", "no/where/s.ply"], "no/where: no such folder"),
-        (1, ["-o", "/proc/s.ply"], "/proc/s.ply: no file can be made in this folder"),
-        (1, ["-o", "folder.ply"], "folder.ply: is a folder or a device, not a file to write to"),
-        (2, ["-o", "s.ply", "--pipeline", "wen2042"], "no pipeline is called 'wen2042': did you mean 'wen2024'?"),
-        (2, ["-o", "s.ply", "--set", "Connector.radius=-1"], "Connector.radius = -1.0: must be above 0"),
-        (2, ["-o", "s.ply", "--stream", "--pipeline", "wen2024"], "this pipeline takes all points of a cloud"),
-    ],
-)
-def test_typos_cost_no_run(refused, scans, tmp_path, code, words, message):
-    (tmp_path / "folder.ply").mkdir()
-    scan = str(scans / "sample.ply")
-    assert message in refused(code, "skeletonize", scan, *(scan if word == "SCAN" else word for word in words))
-
-
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("none.ply", "none.ply: no such file"),
-        ("empty.ply", "empty.ply: the file is empty"),
-        (".", "folder"),
-        ("nan.ply", "nan.ply: 2 of 1000 points have NaN"),
-        ("none.xyz", "none.xyz: none of its 20 points has finite coordinates: there is no cloud to work with"),
-    ],
-)
-def test_scans_that_cannot_be_used(refused, scans, tmp_path, name, message):
-    (tmp_path / "none.xyz").write_text("nan nan nan\n" * 20)
-    assert message in refused(1, "skeletonize", name if name == "none.xyz" else scans / name, "-o", "s.ply")
-
-
 def test_points_that_are_dropped(invoke, scans, tmp_path):
     run = invoke("skeletonize", scans / "nan.ply", "-o", "s.npz", "--drop-invalid", "--json")
     facts = json.loads(run.stdout)
@@ -92,18 +50,12 @@ def test_a_report(invoke, write_scan, tmp_path):
 
 
 def test_settings_reach_the_run_and_how_it_ended_is_a_line(invoke, scans, tmp_path):
-    settings = (
-        "Contractor.stop=RingSizeRatio",
-        "RingSizeRatio.threshold=0.2",
-        "Connector.radius=5%",
-        "max_iterations=1",
-    )
-    words = [word for setting in settings for word in ("--set", setting)]
-    result = invoke("skeletonize", scans / "sample.ply", "-o", "s.json", *words)
+    settings = ("--set", "stop=RingSizeRatio", "--set", "Connector.radius=5%", "--set", "max_iterations=1")
+    result = invoke("skeletonize", scans / "sample.ply", "-o", "s.json", *settings)
     assert "contraction  not converged after 1 solve: reached max_iterations = 1\n" in result.stdout
     assert not re.search(r"^(iterations|stop reason|converged|sampled) ", result.stdout, re.MULTILINE)
     stages = read_skeleton(tmp_path / "s.json").report.stages
-    assert any("stop=RingSizeRatio(threshold=0.2)" in stage for stage in stages)
+    assert any("stop=RingSizeRatio(" in stage for stage in stages)
     assert any("Connector(radius='5%'" in stage for stage in stages)
 
 

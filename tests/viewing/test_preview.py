@@ -106,15 +106,12 @@ def test_the_root_is_marked(tree):
 def test_planar_clouds_and_clouds_without_a_skeleton(make, tmp_path):
     flat = np.random.default_rng(0).random((500, 3)) * [1, 1, 0]
     whole = dataclasses.replace(make(flat[:3], [[0, 1]]), points=flat, vertex_of_point=None, normals=None)
-    none = Skeleton((), (), (), (), flat, ())
-    colours = []
-    for skeleton in (whole, none, Skeleton((), (), (), (), (), ())):
+    found = []
+    for skeleton in (whole, Skeleton((), (), (), (), flat, ()), Skeleton((), (), (), (), (), ())):
         save_preview(skeleton, tmp_path / "p.png")
         image = imread(tmp_path / "p.png")
-        colours.append((is_red(image).any(), is_grey(image).sum()))
-    (flat_red, _), (cloud_red, dots), (nothing_red, words) = colours
-    assert (flat_red, cloud_red, nothing_red) == (True, False, False)
-    assert dots > words + 100
+        found.append((is_red(image).any(), is_grey(image).sum() > 1000))
+    assert found == [(True, True), (False, True), (False, False)]
 
 
 def test_the_same_picture_every_time_without_global_state(tree, tmp_path):
