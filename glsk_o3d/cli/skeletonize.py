@@ -164,19 +164,14 @@ def demo(
 
 def _run(pipeline: Callable[..., Skeleton], cloud: Any, update, on_state=None) -> tuple[Skeleton, float]:
     """Run a pipeline and show how far it is; gives the skeleton, and the seconds it took."""
-    start = time.perf_counter()
-    doing, most = "", None
-
-    def on_stage(stage):
-        nonlocal doing, most
-        doing, most = type(stage).__name__, getattr(stage, "max_iterations", None)
-        update(doing)
 
     def on_iteration(record):
-        left = record.n_points - record.n_merged
-        update(f"{doing}: solve {record.iteration} of at most {most}, {left} points", record.iteration, most)
+        update(f"solve {record.iteration}: {record.n_points - record.n_merged} points are left")
 
-    skeleton = pipeline(cloud, on_iteration=on_iteration, on_state=on_state, on_stage=on_stage)
+    start = time.perf_counter()
+    skeleton = pipeline(
+        cloud, on_iteration=on_iteration, on_state=on_state, on_stage=lambda stage: update(type(stage).__name__)
+    )
     return skeleton, time.perf_counter() - start
 
 

@@ -6,9 +6,12 @@ import sys
 from dataclasses import replace
 
 import numpy as np
+import open3d as o3d
 import pytest
 
-from glsk_o3d import Decision, read_skeleton, save_skeleton
+from glsk_o3d import Decision, read_skeleton, save_skeleton, save_tensor_cloud
+from glsk_o3d.io import streaming
+from glsk_o3d.io.scans import read_blocks
 
 
 @pytest.fixture
@@ -114,12 +117,6 @@ def test_without_a_file_it_lists_what_can_be_read_and_what_is_missing(invoke, mo
 
 
 def test_a_large_cloud_is_told_block_by_block(told, tmp_path, monkeypatch):
-    import open3d as o3d
-
-    from glsk_o3d import save_tensor_cloud
-    from glsk_o3d.io import streaming
-    from glsk_o3d.io.scans import read_blocks
-
     random = np.random.default_rng(2)
     places = random.normal(size=(500, 3))
     places[77] = np.nan

@@ -9,9 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import glsk_o3d
 from glsk_o3d import annotate, read_skeleton, read_tensor_cloud, samples, to_tubes
 from glsk_o3d.cli.options import PipelineName
-from glsk_o3d.io.scans import read_mesh
+from glsk_o3d.io import streaming
+from glsk_o3d.io.scans import read_blocks, read_mesh
 from glsk_o3d.pipelines import PIPELINES
 
 
@@ -166,11 +168,9 @@ def test_tubes_are_those_of_the_skeleton(invoke, las, tmp_path):
 
 
 def test_a_large_scan_is_read_in_blocks(invoke, tmp_path, write_scan, monkeypatch):
-    from glsk_o3d.io import scans, streaming
-
     scan, n = tmp_path / "scan.ply", 9000
     write_scan(scan, samples.torus(n).points)
-    monkeypatch.setitem(scans.read_blocks.__kwdefaults__, "rows", 2000)
+    monkeypatch.setitem(read_blocks.__kwdefaults__, "rows", 2000)
     words = ("skeletonize", scan, "-o", "s.json", "--set", "size=4000", "--set", "thin_to=2000")
     assert invoke(*words).stderr == ""
     whole = read_skeleton("s.json")
@@ -192,8 +192,6 @@ def test_a_large_scan_is_read_in_blocks(invoke, tmp_path, write_scan, monkeypatc
 
 
 def test_a_close_call_comes_with_the_option_that_answers_otherwise(invoke, scans, monkeypatch):
-    import glsk_o3d
-
     call = glsk_o3d.Decision("gap", (1.0, 2.0, 3.0), 0.42, changed=False)
     real = glsk_o3d.Refiner._run
 
