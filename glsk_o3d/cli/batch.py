@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -84,7 +83,7 @@ class _Watch:
     """Shows how far a batch is; says what fails as soon as it does."""
 
     def __init__(self, update):
-        self._update, self._done, self._start = update, 0, time.perf_counter()
+        self._update, self._done = update, 0
 
     def begin(self, plan: Plan) -> None:
         self._total, self.left_out = len(plan.todo), plan.left_out
@@ -92,8 +91,7 @@ class _Watch:
 
     def step(self, row: dict[str, Any]) -> None:
         self._done += 1
-        rate = self._done / (time.perf_counter() - self._start)
-        self._update(f"{rate:.3g} scans/s", self._done, self._total)
+        self._update(f"done: {row['input']}", self._done, self._total)
         if row["status"] == "failed" and not flags.quiet:
             say("warning", f"{row['input']}: {row['error']}")
 

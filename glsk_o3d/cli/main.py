@@ -39,7 +39,6 @@ app = typer.Typer(
     epilog=EPILOG,
 )
 ANALYSES = (evaluate, crosscheck, branches, tree, grasps)
-WITHOUT_JSON = (convert, rig, view, demo)
 
 
 def add_plugged(app: typer.Typer) -> None:
@@ -84,8 +83,7 @@ def main(
 
 
 for function in (skeletonize, batch, run, rerun, *ANALYSES, edit, convert, rig, view, demo, filters, info):
-    command = as_command(function, with_json=function not in WITHOUT_JSON)
-    app.command(epilog=EPILOG if function is skeletonize else None)(command)
+    app.command(epilog=EPILOG if function is skeletonize else None)(as_command(function))
 add_plugged(app)
 
 if __name__ == "__main__":

@@ -23,8 +23,8 @@ class WrongUsage(InvalidParameterError):
     """The command line asks for something impossible, whatever the scan holds."""
 
 
-def as_command(function: Callable[..., None], *, with_json: bool) -> Callable[..., None]:
-    """A function as a command: with --quiet, --verbose and perhaps --json, and with errors as lines."""
+def as_command(function: Callable[..., None]) -> Callable[..., None]:
+    """A function as a command: with --json, --quiet and --verbose, and with errors as lines."""
 
     @wraps(function)
     def command(as_json=False, quiet=False, verbose=False, **options):
@@ -35,12 +35,8 @@ def as_command(function: Callable[..., None], *, with_json: bool) -> Callable[..
             function(**options)
 
     signature = inspect.signature(function, eval_str=True)  # what Typer makes the options from
-    added = {"as_json": Json} if with_json else {}
-    added |= {"quiet": Quiet, "verbose": Verbose}
-    more = [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
-        for name, kind in added.items()
-    ]
+    added, keyword = {"as_json": Json, "quiet": Quiet, "verbose": Verbose}, inspect.Parameter.KEYWORD_ONLY
+    more = [inspect.Parameter(name, keyword, default=False, annotation=kind) for name, kind in added.items()]
     parameters = [*signature.parameters.values(), *more]
     command.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     return command

@@ -154,7 +154,7 @@ def demo(
         missing = f"no {picture.name}: {error}"
     cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(samples.sample_object(points).points))
     save_tensor_cloud(cloud, folder / "cloud.ply")
-    if not flags.quiet:
+    if not (flags.quiet or flags.as_json):
         echo(f"wrote {folder / 'cloud.ply'}")
     outputs = [folder / "skeleton.ply", folder / "skeleton.json"]
     skeletonize(folder / "cloud.ply", outputs, None if missing else picture)

@@ -106,9 +106,9 @@ def test_progress_tells_how_many_and_how_long(monkeypatch):
     screen = Terminal()
     monkeypatch.setattr("sys.stderr", screen)
     with progress(remaining=True) as update:
-        update("3 scans/s", 7, 10)
+        update("done: a.ply", 7, 10)
     plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.getvalue())
-    assert re.search(r"3 scans/s .* 7/10 left: -?\S+", plain)
+    assert re.search(r"done: a\.ply .* 7/10 left: -?\S+", plain)
 
 
 def test_one_skeleton_per_tree_of_a_plot_and_one_of_a_scene_in_tiles(invoke, tmp_path):
