@@ -236,9 +236,6 @@ USES: tuple[Callable[[Skeleton, Path], object], ...] = (
     *(lambda it, _, root=root: analysis.branch_table(it, root) for root in ("z", "thickest", 0, (0, 0, 0))),
     lambda it, _: analysis.segment(it),
     lambda it, _: analysis.segment(it, np.eye(3)),
-    lambda it, _: analysis.thickness(it),
-    lambda it, _: analysis.curvature_torsion(it),
-    lambda it, _: analysis.find_loops(it),
     lambda it, _: analysis.tree_measures(it),
     lambda it, folder: analysis.cylinders(it).to_csv(folder / "c.csv"),
     *(
@@ -251,12 +248,9 @@ USES: tuple[Callable[[Skeleton, Path], object], ...] = (
     lambda it, _: analysis.compare(it, analysis.Truth(it.vertices, it.edges, it.radii)),
     _grasps,
     lambda it, _: editing.prune(it, length=0.1),
-    lambda it, _: editing.prune(it, radius=1),
     lambda it, _: editing.largest_component(it),
     lambda it, _: editing.cut_loops(it),
     lambda it, _: editing.simplify(it, tolerance=0.1),
-    lambda it, _: editing.simplify(it, n=3),
-    lambda it, _: editing.smooth(it),
     lambda it, _: editing.reroot(it),
     lambda it, _: editing.reroot(editing.cut_loops(it)[0], "thickest"),
     lambda it, _: (it.report.uncertain, it.report.unsupported, it.report.is_sampled, it.report.to_dict()),
@@ -270,6 +264,5 @@ SLOW: tuple[Callable[[Skeleton, Path], object], ...] = (
     lambda it, folder: glsk.save_rig(it, folder / "r.glb", cut_loops=True),
     lambda it, folder: glsk.save_mesh(glsk.to_tubes(it), folder / "m.ply"),
     lambda it, _: with_support(it, glsk.pipelines.default(), draws=2, seed=0),
-    lambda it, _: glsk.rerun(it),
 )
 """What takes long."""

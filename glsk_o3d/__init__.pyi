@@ -39,7 +39,7 @@ from .meshlab.meshset import MeshSet
 from .outlier_remover import OutlierRemover
 from .pipeline import Filter, Pipeline
 from .points import Points
-from .recipes import from_recipe, load_recipe, rerun, save_recipe, to_recipe
+from .recipes import from_recipe, load_recipe, save_recipe, to_recipe
 from .refiner import Refiner
 from .report import IterationRecord, Report
 from .resampling import support
@@ -109,7 +109,6 @@ __all__ = [
     "read_tensor_cloud",
     "read_truth",
     "remove_redundant_points",
-    "rerun",
     "save_cylinders",
     "save_mesh",
     "save_preview",

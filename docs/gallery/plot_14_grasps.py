@@ -84,7 +84,7 @@ print(skeleton, *skeleton.report.warnings, sep="\n")
 gripper = Gripper(max_opening=0.08)
 options = dict(cone=((0, 0, -1), 95), around=12, spacing=0.006, clearance=0.006)
 blind = grasp_candidates(skeleton, gripper, cloud=(), **options)
-safe = grasp_candidates(skeleton, gripper, obstacles=plane, **options)
+safe = grasp_candidates(skeleton, gripper, obstacles=[plane], **options)
 print(f"{len(blind)} by the skeleton alone, {len(safe)} that touch nothing else")
 print(*safe.left_out.items(), sep="\n")
 

@@ -20,9 +20,7 @@ if TYPE_CHECKING:
 def batch(
     inputs: Annotated[
         list[str],
-        argument(
-            "DIR|GLOB|LIST|SCAN...", "Folders, glob patterns in quotes, lists (.txt, a path per line), and scans."
-        ),
+        argument("DIR|LIST|SCAN...", "Folders, lists (.txt, a path per line), and scans."),
     ],
     output: Annotated[Path, output_option("FOLDER", "For the skeletons and the ledger; made if needed.")],
     formats: Annotated[str, option("NAMES", f"With commas: {', '.join(SKELETON_ENDINGS)}.", "--format")] = "ply",

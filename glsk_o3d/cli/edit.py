@@ -21,15 +21,12 @@ def edit(
     root: Annotated[Any, root_option("Number vertices from a root outwards, and count orders from there")] = None,
     prune_order: Annotated[int | None, option("N", "Drop branches of a higher order than this.", min=0)] = None,
     prune_length: Annotated[float, option("LENGTH", "Drop shorter branches that end.", min=0)] = 0,
-    prune_radius: Annotated[float, option("RADIUS", "Drop thinner branches that end.", min=0)] = 0,
-    smooth: Annotated[int, option("PASSES", "Smooth the branches.", min=0, max=10**6)] = 0,
     tolerance: Annotated[
         float | None,
         option("TOLERANCE", "Drop vertices as long as the curve moves by no more than this.", "--simplify", min=0),
     ] = None,
-    vertices: Annotated[int | None, option("N", "Keep so many vertices, if the graph allows.", min=1)] = None,
 ) -> None:
-    """Shorten, thin out, smooth or reroot a skeleton.
+    """Shorten, thin out or reroot a skeleton.
 
     What is asked for is done in the order of the options. Lengths are in the units of the file. Orders count from the
     root, the stem is 0.
@@ -47,12 +44,10 @@ def edit(
         edited, _ = editing.cut_loops(edited)
     if root is not None:
         edited = editing.reroot(edited, root)
-    if prune_order is not None or prune_length or prune_radius:
-        edited = editing.prune(edited, length=prune_length, radius=prune_radius, order=prune_order)
-    if smooth:
-        edited = editing.smooth(edited, passes=smooth)
-    if tolerance is not None or vertices is not None:
-        edited = editing.simplify(edited, tolerance=tolerance, n=vertices)
+    if prune_order is not None or prune_length:
+        edited = editing.prune(edited, length=prune_length, order=prune_order)
+    if tolerance is not None:
+        edited = editing.simplify(edited, tolerance=tolerance)
     files, old, new = write_each(outputs, edited), structure(before), structure(edited)
     changed = [f"{name} {old[name]:.6g} -> {new[name]:.6g}" for name in old if old[name] != new[name]]
     tell({"before": old, "after": new}, lambda: echo(", ".join(changed) or "all counts are as before"), files)

@@ -30,10 +30,9 @@ def evaluate(
 ) -> None:
     """Measure how good a skeleton is.
 
-    The assessment is from the cloud alone: is it centred, inside, smooth, in as many parts (clusters), and without
-    false loops? 1 is best. The comparison is with a truth: how far is it from the true axis, in radii? 0 is best of
-    error, ends and radius error, 1 of the others; components, loops, leaves and junctions are more, or fewer, than it
-    has.
+    The assessment is from the cloud alone: is it centred, inside, in as many parts (clusters), and without false loops?
+    1 is best. The comparison is with a truth: how far is it from the true axis, in radii? 0 is best of error, ends and
+    radius error, 1 of the others; components, loops, leaves and junctions are more, or fewer, than it has.
     """
     from .. import read_cloud, read_skeleton, read_truth
     from ..analysis import assess, compare

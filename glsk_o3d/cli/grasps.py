@@ -13,7 +13,7 @@ from .reporting import WrongUsage
 if TYPE_CHECKING:
     from ..analysis import GraspCandidates
 
-GRASP_ENDINGS = (".json", ".csv", ".ply")
+GRASP_ENDINGS = (".json", ".csv")
 
 
 def grasps(
@@ -25,9 +25,7 @@ def grasps(
     cone: Annotated[str | None, option("DIRECTION,DEGREES", "Come in no farther from this, such as -z,60.")] = None,
     min_confidence: Annotated[float, option("SHARE", "Of the skeleton, from 0 to 1.")] = 0.5,
     count: Annotated[int, option("N", "How many to show and write, of each place its best first.", "-n", min=1)] = 20,
-    output: Annotated[
-        list[Path] | None, output_option("FILE", "json, csv, or ply to look at; may be repeated.")
-    ] = None,
+    output: Annotated[list[Path] | None, output_option("FILE", "json or csv; may be repeated.")] = None,
 ) -> None:
     """Find where a gripper with two jaws can take an object.
 
@@ -38,7 +36,7 @@ def grasps(
     from .. import read_cloud, read_skeleton
     from ..analysis import grasp_candidates
 
-    outputs = [Output(path, GRASP_ENDINGS, "grasps are JSON, CSV or PLY", _save) for path in output or []]
+    outputs = [Output(path, GRASP_ENDINGS, "grasps are JSON or CSV", _save) for path in output or []]
     check_outputs(outputs, skeleton, cloud, *(scene or []))
     found = grasp_candidates(
         read_skeleton(skeleton),
@@ -54,7 +52,7 @@ def grasps(
 
 
 def _save(best: GraspCandidates, path: Path) -> None:
-    {".json": best.to_json, ".csv": best.to_csv, ".ply": best.to_ply}[path.suffix.lower()](path)
+    {".json": best.to_json, ".csv": best.to_csv}[path.suffix.lower()](path)
 
 
 def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:

@@ -22,7 +22,7 @@ from .info import info
 from .measures import branches, tree
 from .reporting import as_command, reporting
 from .run import run
-from .skeletonize import demo, rerun, skeletonize
+from .skeletonize import demo, skeletonize
 from .view import view
 
 EPILOG = (
@@ -82,7 +82,7 @@ def main(
     """Curve skeletons from point clouds."""
 
 
-for function in (skeletonize, batch, run, rerun, *ANALYSES, edit, convert, rig, view, demo, filters, info):
+for function in (skeletonize, batch, run, *ANALYSES, edit, convert, rig, view, demo, filters, info):
     app.command(epilog=EPILOG if function is skeletonize else None)(as_command(function))
 add_plugged(app)
 

@@ -54,10 +54,10 @@ def tree(
     up: Annotated[str | None, option("AXIS", "What points up, x to -z; else as it was grown, or z.")] = None,
     unit: Annotated[str, option("UNIT", "One unit of the file: m, cm, mm, in or ft, or its metres.")] = "m",
 ) -> None:
-    """Measure a tree: height, stem, crown, volume by order.
+    """Measure a tree: height, stem, length and volume by order.
 
-    Of length, area and volume there is a number for each order, from that of the stem on. Volume is that of parts with
-    a surface: where there was none, radii are the scatter of the points, and the share is called traced. What is hardly
+    Of length and volume there is a number for each order, from that of the stem on. Volume is that of parts with a
+    surface: where there was none, radii are the scatter of the points, and the share is called traced. What is hardly
     as it should be is said on stderr, and in JSON as doubts.
     JSON and npz files say where the tree grows from, and keep the points that the stem's diameter is measured on. All
     is in metres if --unit says what a unit of the file is; only a csv file of cylinders is in the units of the file.

@@ -51,7 +51,7 @@ DropInvalid = Annotated[bool, Option("--drop-invalid", help="Drop points with Na
 
 PipelineName = Annotated[
     str,
-    option("NAME|FILE", "default, tree, wen2024, cao2010, a plugin's (see 'glsk filters'), or a recipe: json or toml."),
+    option("NAME|FILE", "default, tree, wen2024, cao2010, a plugin's, or a recipe: json or toml, or a result in json."),
 ]
 Settings = Annotated[
     list[str] | None,

@@ -28,7 +28,7 @@ def as_command(function: Callable[..., None]) -> Callable[..., None]:
 
     @wraps(function)
     def command(as_json=False, quiet=False, verbose=False, **options):
-        clouds = (options.get(name) for name in ("scan", "cloud", "mesh", "result"))
+        clouds = (options.get(name) for name in ("scan", "cloud", "mesh"))
         cloud = next((path for path in clouds if path is not None), None)
         flags.as_json = as_json
         with reporting(cloud, quiet=quiet, verbose=verbose):

@@ -20,7 +20,7 @@ def run(
     scan: Annotated[Path | None, argument("SCAN", "The cloud or mesh it starts from.")] = None,
     output: Annotated[
         list[Path] | None,
-        output_option("FILE", "The last layer: a skeleton, points (ply, pcd, xyz) or a mesh (ply, obj, off, stl)."),
+        output_option("FILE", "The last layer: a skeleton, points or a mesh (ply, xyz)."),
     ] = None,
     listed: Annotated[bool, Option("--list", help="List the scripts that come with the package.")] = False,
     any_filter: Annotated[

@@ -1,11 +1,10 @@
-"""``glsk skeletonize``, ``glsk rerun`` and ``glsk demo``: from a cloud to a skeleton."""
+"""``glsk skeletonize`` and ``glsk demo``: from a cloud to a skeleton."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,7 +12,7 @@ from typer import Option
 
 from . import options
 from .console import echo, flags, print_rows, progress, say
-from .options import argument, option, output_option
+from .options import option, output_option
 from .outputs import Output, check_outputs, skeleton_outputs, tell, write_each
 from .reporting import WrongUsage
 
@@ -95,43 +94,6 @@ def skeletonize(
     _tell(skeleton, seconds, files)
 
 
-def rerun(
-    result: Annotated[Path, argument("RESULT", "A skeleton that 'glsk skeletonize' wrote as json or npz.")],
-    scan: Annotated[Path | None, argument("SCAN", "Another cloud to run it on, instead of its points.")] = None,
-    output: options.SkeletonOutput = None,
-    preview: options.Preview = None,
-    report: options.ReportPage = None,
-    cut_loops: options.CutLoops = False,
-) -> None:
-    """Repeat the run that made a result.
-
-    It is run with the recipe that the result holds. On the points of the result the skeleton is the same to the last
-    bit; where other releases make it differ, there is a warning. Without outputs it only says whether it is the same.
-    'glsk skeletonize --pipeline FILE' runs recipes from files of their own.
-    """
-    from .. import ContractionRecorder, RecipeError, from_recipe, read_cloud, read_skeleton
-    from .. import rerun as run_again
-    from ..io.streaming import sample_for
-    from ..recipes.rerun import identical, is_of_sample
-
-    recorder, title = ContractionRecorder() if report is not None else None, (scan or result).name
-    outputs = skeleton_outputs(output, preview, report, title=title, cut_loops=cut_loops, recorder=recorder)
-    check_outputs(outputs, scan, result)
-    with progress() as update:
-        update(f"reading {result.name}")
-        made, cloud = read_skeleton(result), None
-        try:
-            if scan is not None and is_of_sample(made):
-                cloud = sample_for(from_recipe(made.report.recipe), scan, stream=True)
-            elif scan is not None:
-                cloud = read_cloud(scan)
-            skeleton, seconds = _run(partial(run_again, made), cloud, update, recorder)
-        except RecipeError as error:
-            raise RecipeError(f"{result}: cannot be repeated: {error}") from error
-        files = write_each(outputs, skeleton, update)
-    _tell(skeleton, seconds, files, {"identical": identical(skeleton, made)})
-
-
 def demo(
     folder: Annotated[Path, output_option("FOLDER", "Made if it is not there.")] = Path("demo"),
     points: Annotated[int, option("N", "How many points the scan has.", "--points", "-n", min=8, max=10**9)] = 8192,
@@ -175,12 +137,12 @@ def _run(pipeline: Callable[..., Skeleton], cloud: Any, update, on_state=None) -
     return skeleton, time.perf_counter() - start
 
 
-def _tell(skeleton: Skeleton, seconds: float, files: Mapping[Path, str], more: Mapping[str, Any] | None = None) -> None:
-    """Print the summary of a run, with `more` facts, and the files written; then OSError if there were problems."""
+def _tell(skeleton: Skeleton, seconds: float, files: Mapping[Path, str]) -> None:
+    """Print the summary of a run, and the files written; then OSError if there were problems."""
     from ..analysis.summary import summary
 
     report = skeleton.report
-    facts = {**summary(skeleton, seconds), **(more or {})}
+    facts = summary(skeleton, seconds)
     supported = {"unsupported": list(map(asdict, report.unsupported))} if report.n_draws else {}
     whole = {**facts, **supported, "warnings": list(report.warnings)}
     tell(whole, lambda: print_rows(_shown(facts, skeleton)), files)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FileFormatError, InvalidParameterError
+from ..errors import FileFormatError
 from ..interop.atomic import write_atomically
 from ..interop.packages import import_open3d
 from .formats import glb, ply
@@ -168,26 +168,3 @@ def _off(points: np.ndarray, triangles: np.ndarray, mesh: Any) -> bytes:
 def _colors(mesh: Any) -> list[np.ndarray]:
     """The colours of the vertices, if there are any."""
     return [np.asarray(mesh.vertex_colors)] if mesh.has_vertex_colors() else []
-
-
-def mesh_arrays(mesh: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices, (V, 3) float64, and triangles, (F, 3) int64, of a mesh of Open3D or a pair of arrays.
-
-    InvalidParameterError if it is none, has no triangles, or coordinates or indices are of no use.
-    """
-    try:
-        if hasattr(mesh, "triangle"):
-            parts = mesh.vertex.positions.cpu().numpy(), mesh.triangle.indices.cpu().numpy()
-        else:
-            parts = (mesh.vertices, mesh.triangles) if hasattr(mesh, "triangles") else mesh
-        vertices, faces = (np.asarray(part) for part in parts)
-    except Exception as error:  # whatever a foreign object raises
-        raise InvalidParameterError(f"a {type(mesh).__name__} is no triangle mesh: {error}") from error
-    if vertices.shape[1:] != (3,) or faces.shape[1:] != (3,) or len(faces) == 0:
-        shapes = f"{vertices.shape} and {faces.shape}"
-        raise InvalidParameterError(f"a mesh needs (V, 3) vertices and (F, 3) triangles, not {shapes}")
-    if vertices.dtype.kind not in "iuf" or not np.isfinite(vertices).all():
-        raise InvalidParameterError("the mesh has vertices that are not finite numbers")
-    if faces.dtype.kind not in "iu" or faces.min() < 0 or faces.max() >= len(vertices):
-        raise InvalidParameterError("a triangle of the mesh names a missing vertex")
-    return vertices.astype(float), faces.astype(np.int64)

@@ -120,6 +120,10 @@ def test_one_skeleton_per_tree_of_a_plot_and_one_of_a_scene_in_tiles(invoke, tmp
     )
     assert (told["done"], told["failed"]) == (2, 0)
     assert read_skeleton("out/plot-9.ply").vertices[:, 0].min() > 5
-    told = json.loads(invoke("batch", "plot.csv", "-o", "tiles", "--tiles", "3", "--overlap", "0.5", "--json").stdout)
+    words = ["batch", "plot.csv", "-o", "tiles", "--tiles", "3", "--overlap", "0.5", "--json"]
+    told = json.loads(invoke(*words).stdout)
     assert (told["done"] > 3, told["failed"]) == (True, 0)
+    plan = json.loads(invoke(*words, "--dry-run").stdout)
+    assert plan["tasks"][0]["input"] == f"{tmp_path}/plot.csv tile 0-0-0"
+    assert (plan["todo"], plan["skipped"]) == (0, told["done"])
     assert read_skeleton("tiles/plot.ply").n_loops == 3

@@ -24,15 +24,15 @@ def file(tmp_path):
 
 
 def test_edits_one_after_the_other(invoke, file, tmp_path):
-    words = ["--largest", "--cut-loops", "--root", "x", "--prune-length", "0.5", "--smooth", "2", "--vertices", "5"]
+    words = ["--largest", "--cut-loops", "--root", "x", "--prune-length", "0.5", "--simplify", "0.6"]
     result = invoke("edit", file, "-o", "new.swc", "-o", "new.json", *words)
     assert result.exit_code == 0, result.output
     counts, first, second = result.stdout.splitlines()
-    assert counts.startswith("vertices 17 -> 5, edges 16 -> 4, components 2 -> 1, loops 1 -> 0, ")
+    assert counts.startswith("vertices 17 -> 6, edges 16 -> 5, components 2 -> 1, loops 1 -> 0, ")
     assert (first, second) == ("wrote new.swc", "wrote new.json")
     new = read_skeleton(tmp_path / "new.json")
     told = json.loads(invoke("edit", file, "-o", "again.json", *words, "--json").stdout)
-    assert [told[when]["vertices"] for when in ("before", "after")] == [17, 5]
+    assert [told[when]["vertices"] for when in ("before", "after")] == [17, 6]
     assert told["files"] == ["again.json"]
     assert (new.n_components, new.n_loops, new.vertices[0, 0]) == (1, 0, new.vertices[:, 0].min())
     assert read_skeleton(tmp_path / "new.swc").length == pytest.approx(new.length)

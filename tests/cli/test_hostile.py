@@ -67,6 +67,7 @@ def test_nothing_of_a_file_or_its_name_reaches_the_terminal(invoke, tmp_path, mo
     [
         ["skeletonize", "s.xyz", "-o", "o.json", "--set", "RingBuilder.k={}"],
         ["demo", "-o", "out", "--points", "{}"],
+        ["edit", "y.ply", "-o", "o.json", "--prune-order", "{}"],
         ["branches", "y.ply", "--root", "{}"],
     ],
 )

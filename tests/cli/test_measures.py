@@ -24,12 +24,13 @@ def test_branches_table_file_and_json_agree(invoke, tmp_path, y):
         assert [row["kind"] for row in csv.DictReader(stream)] == [row["kind"] for row in rows]
     lines = invoke("branches", y).stdout.splitlines()
     heads = [head.replace(" ", "_") for head in re.split(r"  +", next(filter(None, lines)).strip())]
-    assert heads == [name for name in PRINTED_COLUMNS if name != "support"]  # nobody measured it
-    told = [line.split() for line in lines if line.strip()[:1].isdigit()]
-    assert [words[:7] for words in told] == [
-        ["0", "tip", "-", "0", "0", "0", "0.5"],
-        ["1", "tip", "0", "1", "0", "0", "0.5"],
-        ["2", "tip", "0", "1", "2", "1", "0.5"],
+    assert heads == [name for name in rows[0] if name in PRINTED_COLUMNS and name != "support"]  # nobody measured it
+    told = [dict(zip(heads, line.split(), strict=True)) for line in lines if line.strip()[:1].isdigit()]
+    shown = [[row[name] for name in ("branch", "kind", "parent", "length", "angle", "order")] for row in told]
+    assert shown == [
+        ["0", "tip", "-1", "0.5", "-", "0"],
+        ["1", "tip", "0", "0.5", "40", "0"],
+        ["2", "tip", "0", "0.5", "40", "1"],
     ]
     facts = json.loads(invoke("branches", y, "--json").stdout)
     assert facts["branches"][0]["angle"] is None

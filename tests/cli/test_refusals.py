@@ -1,7 +1,6 @@
 """What the commands refuse: in one line that says what was wrong and where, before they write anything."""
 
 import numpy as np
-import open3d as o3d
 import pytest
 
 from glsk_o3d import Skeleton, read_skeleton, samples, save_skeleton
@@ -21,7 +20,6 @@ TABLE = """
     2 tree y.ply -o c.xlsx                                 | c.xlsx: the file is a table of cylinders and its name ends
     2 edit o.ply                                           | nothing to write: give an output with -o
     2 edit o.ply -o o.ply                                  | o.ply: is an input
-    2 edit o.ply -o new.ply --simplify 1 --vertices 3      | simplify needs either a tolerance or n
     1 convert o.ply a.swc                                  | a.swc: this format holds trees only
     2 convert o.ply a.nope                                 | a.nope: the file is a skeleton and its name ends in
     2 convert y.ply a.ply --root x                         | for others use 'glsk edit'
@@ -38,7 +36,7 @@ TABLE = """
     2 grasps rod.npz --opening 1 --plane 0,0,0,1           | is no plane
     2 grasps rod.npz --opening 1 --cone z                  | --cone ,z: write 4 numbers
     2 grasps rod.npz --opening 1 --cone z,270              | the angle of cone = 270.0: must be
-    2 grasps rod.npz --opening 1 -o g.txt                  | the grasps are JSON, CSV or PLY and its name ends in .json
+    2 grasps rod.npz --opening 1 -o g.ply                  | the grasps are JSON or CSV and its name ends in .json
     2 grasps y.ply --opening 1                             | has no confidence, perhaps due to its file: give min_con
     2 grasps y.ply --opening 1 --min-confidence 0          | has no points of the object: give cloud=
     1 grasps rod.npz --opening 1 --scene none.ply          | none.ply: no such file
@@ -46,9 +44,6 @@ TABLE = """
     1 evaluate dot.ply SCANS/ring.ply                      | dot.ply: the skeleton has no edge with a length
     1 evaluate y.ply few.xyz                               | few.xyz: no part of the skeleton has 6 points around it
     2 evaluate y.ply SCANS/ring.ply -o r.txt               | r.txt: the report is JSON and its name ends in .json
-    1 crosscheck SCANS/ring.ply --mesh no.xyz              | unknown ending of a mesh
-    1 crosscheck SCANS/ring.ply --mesh SCANS/ball.ply      | ball.ply: no triangles could be read
-    1 crosscheck SCANS/ring.ply --mesh away.ply            | ring.ply: no point of the cloud lies on the mesh
     1 crosscheck SCANS/nan.ply                             | nan.ply: 2 of 1000 points
     1 info SCANS/empty.ply                                 | empty.ply: the file is empty
     1 info none.ply                                        | none.ply: no such file
@@ -88,7 +83,7 @@ BEFORE_ANY_RUN = """
     1 run none.mlx SCANS/ring.ply -o s.ply                 | none.mlx: no such file
     1 run bad.mlx SCANS/ring.ply -o s.ply                  | bad.mlx, line 2: no filter is called 'Generate Skeletn'
     2 run glskeleton SCANS/ring.ply -o s.stl               | s.stl: unknown ending; known are .ply
-    2 run points.mlx SCANS/ring.ply -o s.json              | s.json: unknown ending for points; known are .ply, .pcd
+    2 run points.mlx SCANS/ring.ply -o s.json              | s.json: unknown ending for points or mesh; known are .ply
     1 run glskeleton y.ply -o t.json                       | the current layer (y.ply) is a skeleton or another line
     1 batch none -o out                                    | none: no such file or folder
     2 batch SCANS/ring.ply -o out --format stl             | unknown ending; known are .ply
@@ -110,11 +105,9 @@ def files(tmp_path, y, ring_file):
     save_skeleton(skeleton, tmp_path / "rod.npz")
     np.savez(tmp_path / "none.npz", nodes=none, edges=np.empty((0, 2), int), radii=[])
     np.savetxt(tmp_path / "few.xyz", np.eye(3))
-    cube = o3d.geometry.TriangleMesh.create_box().translate((50, 0, 0))
-    o3d.io.write_triangle_mesh(str(tmp_path / "away.ply"), cube)
     texts = {"junk.ply": "hello", "nan.xyz": "0 0 0\n0 nan 1\n", "bad.json": "{}", "bad.swc": "1 2", "bad.docx": "x"}
     texts |= {"none.xyz": "nan nan nan\n" * 20, "bad.mlx": SCRIPT.format("Generate Skeletn")}
-    texts |= {"points.mlx": SCRIPT.format("Generate One Rings (GLSkeleton)")}
+    texts |= {"points.mlx": SCRIPT.format("Generate Segmented Cloud (GLSkeleton)")}
     (tmp_path / "folder.ply").mkdir()
     for name, text in texts.items():
         (tmp_path / name).write_text(text)

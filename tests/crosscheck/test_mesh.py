@@ -16,14 +16,16 @@ from glsk_o3d.crosscheck.mesh import (
     mesh_laplacian,
     mesh_skeleton,
     mesh_state,
+    orient_normals,
     poisson,
     ring_areas,
     spacing,
 )
+from glsk_o3d.crosscheck.mesh_rings import common_share, umbrellas
 from glsk_o3d.numerics.cotangent import WEIGHT_CAP, cotangent_laplacian
-from glsk_o3d.numerics.mesh_rings import common_share, umbrellas
+from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
 from glsk_o3d.numerics.rings import Rings
-from glsk_o3d.samples import sheet, torus, tube
+from glsk_o3d.samples import sheet, sphere, torus, tube, two_rings
 
 
 def convex_rings(points, faces):
@@ -228,3 +230,17 @@ def test_the_skeleton_of_a_torus_is_its_axis():
     ring = torus(10)
     assert np.abs(np.linalg.norm(skeleton.vertices[:, :2], axis=1) - np.linalg.norm(ring.nodes[0])).max() < 0.01
     assert np.abs(skeleton.vertices[:, 2]).max() < 0.01
+
+
+# ------------------------------------------------------------------------------------------------------ orientation
+
+
+@pytest.mark.parametrize("shape", [sphere, torus, two_rings])
+def test_normals_of_closed_surfaces_point_outward(shape):
+    sample = shape(3000)
+    outward = sample.points - sample.nodes[cKDTree(sample.nodes).query(sample.points)[1]]
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    mixed = outward * np.random.default_rng(0).choice([-1, 1], (len(outward), 1))
+    neighbours = nearest_neighbours(sample.points, 8)[1]
+    edges = np.column_stack([np.repeat(np.arange(3000), 7), neighbours[:, 1:].ravel()])
+    np.testing.assert_array_equal(orient_normals(sample.points, mixed, edges), outward)

@@ -73,7 +73,7 @@ def test_parameters_choose_pipeline_and_settings(ros, cloud, points, tmp_path, r
 
 def test_with_an_opening_poses_are_grasps_above_a_table_and_in_a_cone(ros, cloud, expected, rows):
     table, where = [0.0, 0.0, 1.0, 0.25], [0.0, 1.0, -1.0]
-    options = dict(obstacles=table, cone=(where, 50))
+    options = dict(obstacles=[table], cone=(where, 50))
     for more, less in (({}, {}), (dict(plane=table, approach=where, approach_angle=50.0), options)):
         node = ros.node(opening=0.6, **more)
         node.on_cloud(cloud)
