@@ -259,7 +259,6 @@ USES: tuple[Callable[[Skeleton, Path], object], ...] = (
 SLOW: tuple[Callable[[Skeleton, Path], object], ...] = (
     _page,
     lambda it, _: to_html(it),
-    lambda it, folder: glsk.save_assessment(it, it.points, np.ones(len(it.edges)), folder / "a.png", label="a"),
     lambda it, folder: glsk.save_preview(it, folder / "p.png"),
     lambda it, _: plt.close(glsk.plot_skeleton(it, color="radius").figure),
     lambda it, folder: glsk.save_rig(it, folder / "r.glb", cut_loops=True),

@@ -52,7 +52,7 @@ from .thinner import Thinner
 from .tracer import Tracer
 from .viewing.page import ContractionRecorder, save_report
 from .viewing.plot import plot_skeleton
-from .viewing.preview import save_assessment, save_preview
+from .viewing.preview import save_preview
 
 __version__: str
 
@@ -109,7 +109,6 @@ __all__ = [
     "read_tensor_cloud",
     "read_truth",
     "remove_redundant_points",
-    "save_assessment",
     "save_cylinders",
     "save_mesh",
     "save_preview",

@@ -17,9 +17,6 @@ LARGEST_WHOLE = 2**63 - 1  # derived: of the numbers that NumPy counts with
 LARGEST, SMALLEST_LENGTH = 1e100, 1e-100  # derived: a float64 holds their cubes
 LONGEST_SHOWN = 200  # fitted: characters of a value that say what was meant
 
-TYPES = ("int", "float", "bool", "length", "point", "choice", "reducer", "stop")
-"""What a parameter may be; with a trailing ``?`` also None."""
-
 
 def parameter(
     default: Any,

@@ -11,7 +11,6 @@ from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
 
 from .errors import GlskError, InvalidCloudError, InvalidParameterError, StageError, did_you_mean
 from .interop.clouds import Cloud, cloud_points
-from .interop.packages import following_open3d
 from .parameters import UNWRITTEN, Parameters, is_own
 from .points import Points
 from .report import STOPPED_BY_CALLER, IterationRecord, Report, warn
@@ -180,20 +179,19 @@ class Pipeline(Generic[Produced]):
         self.check()
         data, report = cloud, cloud.report if isinstance(cloud, FLOWS[1:]) else Report()
         told = report.warnings
-        with following_open3d():
-            watch = _watch(on_iteration, on_state)
-            for stage in self.stages:
-                if on_stage is not None:
-                    on_stage(stage)
-                start = time.perf_counter()
-                data = stage.run(data, watch)
-                seconds = time.perf_counter() - start
-                _log.debug("%s took %.3f s: %r", type(stage).__name__, seconds, data)
-                if stage.produces is Cloud:
-                    report = with_stage(report, stage, seconds)
-                else:
-                    report = with_stage(with_filters(data.report, report), stage, seconds)
-                    data = dataclasses.replace(data, report=report)
+        watch = _watch(on_iteration, on_state)
+        for stage in self.stages:
+            if on_stage is not None:
+                on_stage(stage)
+            start = time.perf_counter()
+            data = stage.run(data, watch)
+            seconds = time.perf_counter() - start
+            _log.debug("%s took %.3f s: %r", type(stage).__name__, seconds, data)
+            if stage.produces is Cloud:
+                report = with_stage(report, stage, seconds)
+            else:
+                report = with_stage(with_filters(data.report, report), stage, seconds)
+                data = dataclasses.replace(data, report=report)
         warn(message for message in report.warnings if message not in told)
         return data
 

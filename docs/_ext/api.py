@@ -56,7 +56,7 @@ NAMES = {
         "For other programs": ("save_cylinders", "save_rig", "save_mesh"),
     },
     "viewing": {
-        "Pictures and pages": ("plot_skeleton", "save_preview", "save_report", "save_assessment"),
+        "Pictures and pages": ("plot_skeleton", "save_preview", "save_report"),
         "What happened on the way": ("ContractionRecorder",),
     },
     "analysis": {

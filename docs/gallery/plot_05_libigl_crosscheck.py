@@ -17,9 +17,7 @@ from glsk_o3d.samples import y_junction
 def show(check):
     """The skeleton, and the points by their angle, pale where it is small; grey ones could not be compared."""
     colors = plt.colormaps["YlOrRd"].with_extremes(bad="lightgrey")(check.angle / 60)[:, :3]
-    glsk.plot_skeleton(
-        check.skeleton, cloud=check.points, point_colors=colors, color=(0, 0, 0), point_size=4
-    )
+    glsk.plot_skeleton(check.skeleton, cloud=check.points, point_colors=colors, color=(0, 0, 0))
 
 
 # %%

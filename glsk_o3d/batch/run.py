@@ -5,17 +5,19 @@ from __future__ import annotations
 import logging
 import os
 import shutil
+import signal
+import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import BatchError, InvalidParameterError
 from ..interop.atomic import write_json
-from ..interop.interrupts import counted_interrupts
 from ..numerics.cores import cores
 from ..parameters import check_number
 from .ledger import DONE, FAILED, LEDGER_COLUMNS, LOCK_FILE, STARTED, Row, locked, refuse_ways_out
@@ -158,6 +160,20 @@ def _hired(plan: Plan, workers, scheduler, executor) -> Workers:
     return LocalWorkers(min(workers or cores(), len(plan.todo)))
 
 
+@contextmanager
+def _counted_interrupts() -> Iterator[list[int]]:
+    """Count Ctrl-C in a list instead of being torn out of the block by it; outside the main thread none comes."""
+    pressed: list[int] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield pressed
+        return
+    before = signal.signal(signal.SIGINT, lambda number, frame: pressed.append(number))
+    try:
+        yield pressed
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 class _Run:
     """A batch at work. Scenes are joined when all tiles are done."""
 
@@ -176,7 +192,7 @@ class _Run:
         write_json(plan.out_dir / RECIPE_FILE, plan.recipe)
         for folder in {(plan.out_dir / task.name).parent for task in plan.todo}:
             folder.mkdir(parents=True, exist_ok=True)  # a worker's own would be where nobody looks
-        with counted_interrupts() as self._interrupts:  # no line of the ledger is torn
+        with _counted_interrupts() as self._interrupts:  # no line of the ledger is torn
             self._do([task for task in plan.todo if not task.needs])
             self._do([task for task in plan.todo if task.needs and self._has_all_tiles(task)])
 

@@ -119,7 +119,7 @@ def mesh_fit(state, vertices, faces):
     The state is fresh from the ring builder.
     """
     points, rings, step = state.cloud, state.rings, spacing(state.cloud)
-    squared = require("igl", "libigl").point_mesh_squared_distance(points, vertices, faces)[0]
+    squared = require("igl").point_mesh_squared_distance(points, vertices, faces)[0]
     used = np.unique(faces)
     border = border_lengths(len(vertices), faces)[used] > TEAR_EDGES
     piece = component_labels(len(vertices), np.concatenate([faces[:, :2], faces[:, 1:]]))[used]
@@ -153,7 +153,7 @@ def _genus(faces):
 
 def _on_mesh(points, vertices, faces, values):
     """Values at the vertices, interpolated at the places on the mesh nearest to the points; and how far these are."""
-    squared, face, place = require("igl", "libigl").point_mesh_squared_distance(points, vertices, faces)
+    squared, face, place = require("igl").point_mesh_squared_distance(points, vertices, faces)
     arm = vertices[faces[face]] - place[:, None]
     weight = np.linalg.norm(np.cross(arm[:, [1, 2, 0]], arm[:, [2, 0, 1]]), axis=2)  # the area opposite to each corner
     weight /= weight.sum(axis=1, keepdims=True)

@@ -132,7 +132,7 @@ def cross_check(
     check_number("max_points", max_points, "int?", low=MIN_POINTS)
     pipeline.check()
     pipeline.check_complete()
-    require("igl", "libigl")  # before the work that it is for
+    require("igl")  # before the work that it is for
     given = cloud_points(cloud)
     points = _thinned(given, max_points)
     rings = kinds.index(RingBuilder) + 1

@@ -89,7 +89,7 @@ def surface_of(state, method):
 
 def mesh_laplacian(vertices, faces, cap=WEIGHT_CAP):
     """Twice ``igl.cotmatrix``, capped as `cotangent_laplacian` is, (n, n) csr_matrix; bare vertices have empty rows."""
-    igl = require("igl", "libigl")
+    igl = require("igl")
     faces = faces[igl.doublearea(vertices, faces) > 0]  # igl would divide by them
     laplacian = 2 * igl.cotmatrix(vertices, faces)
     return (diags_array(cap / np.maximum(np.abs(laplacian.diagonal()), cap)) @ laplacian).tocsr()
@@ -97,7 +97,7 @@ def mesh_laplacian(vertices, faces, cap=WEIGHT_CAP):
 
 def mesh_areas(vertices, faces):
     """Area of every vertex, (n,) float array: the mixed Voronoi areas of ``igl.massmatrix`` (Meyer et al. 2003)."""
-    igl = require("igl", "libigl")
+    igl = require("igl")
     areas = igl.massmatrix(vertices, faces, igl.MASSMATRIX_TYPE_VORONOI).diagonal()
     return np.pad(areas, (0, len(vertices) - len(areas)))  # igl leaves out bare vertices at the end
 
@@ -134,7 +134,7 @@ def mesh_state(state, vertices, faces):
             sampled=np.ones(m, bool),
             cloud=vertices,
             noise=np.zeros(m),
-            normals=require("igl", "libigl").per_vertex_normals(vertices, faces),
+            normals=require("igl").per_vertex_normals(vertices, faces),
         )
     survivors, faces = np.unique(faces, return_inverse=True)
     positions, faces, n = vertices[survivors], faces.reshape(-1, 3), len(survivors)

@@ -33,7 +33,7 @@ def plugins(group: str) -> dict[str, Any]:
     if group not in _found:
         found = _found[group] = {}  # already there for plugins that themselves ask for plugins
         problems: list[str] = []
-        for distribution, entry in entry_points(group, problems):
+        for entry in entry_points(group, problems):
             try:
                 found[entry.name] = _load(entry, group, found)
             except KeyboardInterrupt:
@@ -41,7 +41,8 @@ def plugins(group: str) -> dict[str, Any]:
                 raise
             except BaseException as error:  # whatever code of others raises; some is no Exception
                 cause = str(error) if isinstance(error, _Unfit) else f"{type(error).__name__}: {error}"
-                problems.append(f"plugin {entry.name!r} ({entry.value}) of {distribution} left out: {cause}")
+                package = f"{entry.dist.name} {entry.dist.version}" if entry.dist else "an unknown package"
+                problems.append(f"plugin {entry.name!r} ({entry.value}) of {package} left out: {cause}")
         for problem in problems:
             warnings.warn(problem, PluginWarning, stacklevel=outside())
     return _found[group]

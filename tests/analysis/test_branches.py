@@ -91,7 +91,7 @@ def test_a_root_inside_a_branch_and_at_a_junction():
 
 
 def test_y_junction_exactly_and_from_its_cloud():
-    sample = samples.y_junction(2000, angle=80)
+    sample = samples.y_junction(2000)
     table = branch_table(axis_of(sample))
     np.testing.assert_allclose(table.length, 0.5)
     np.testing.assert_allclose(table.angle[1:], 40)

@@ -80,7 +80,7 @@ def test_structure_is_counted(ring, curve):
 
 
 def test_a_ball_has_one_node(curve):
-    ball = sphere(100, radius=0.5)
+    ball = sphere(100)
     found = compare(curve([[0.1, 0, 0]], np.empty((0, 2), int)), ball)
     assert (found.error, found.inside, found.completeness) == (pytest.approx(0.2), 1, 1)
     assert (found.ends, found.length, found.topology, found.edge_error.shape) == (None, None, True, (0,))

@@ -61,7 +61,7 @@ def begin(saboteur, start, waiting, write, tmp_path):
         write(tmp_path / "in" / f"{i}.ply", seed=i, order=4000 * (i == 2))
 
     def run():
-        batch = start("in", "-o", "out", "--recipe", saboteur, "--workers", "1")
+        batch = start("in", "-o", "out", "--pipeline", saboteur, "--workers", "1")
         [worker] = map(psutil.Process, waiting(batch))
         os.killpg(batch.pid, signal.SIGINT)
         for line in batch.stderr:

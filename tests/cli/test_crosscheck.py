@@ -27,23 +27,12 @@ def test_what_it_says_and_writes(invoke, scans, tmp_path, check):
     first, *lines = run.stdout.splitlines()
     assert first.endswith("name.ply: agrees")
     words = " ".join(run.stdout.split())
-    assert f"rings compared {check.rows.compared} of {check.rows.closed} closed ones" in words
-    assert "loops 1 and 1" in words
-    assert "because" not in words
+    assert f"compared {check.rows.compared}, " in words
+    assert "loops 1 1" in words
     assert "which is as of clean, dense clouds;" in words
     assert lines[-2:] == ["wrote r.json", "wrote marked.ply"]
     marked = read_tensor_cloud(tmp_path / "marked.ply")
     np.testing.assert_array_equal(marked.point.angle.numpy()[:, 0], check.angle)
-    assert invoke("view", "marked.ply", "--color", "angle", "--preview", "p.png").exit_code == 0
-
-
-def test_reasons_and_warnings(invoke, scans):
-    result = invoke("crosscheck", scans / "ball.ply", "--method", "poisson", "--max-points", "500")
-    assert result.exit_code == 0
-    assert "glsk: warning: 500 of 1000 points are checked: raise max_points to use more" in result.stderr
-    assert "because" in result.stdout
-    assert "mesh poisson, " in " ".join(result.stdout.split())
-    assert "same rings" not in result.stdout
 
 
 def test_a_mesh_at_fault_is_not_held_against_the_cloud(invoke, tmp_path, write_scan):
@@ -52,7 +41,6 @@ def test_a_mesh_at_fault_is_not_held_against_the_cloud(invoke, tmp_path, write_s
     assert json.loads(result.stdout)["verdict"] == "cannot tell"
     assert result.exit_code == 1
     assert "glsk: error: ring.ply: the check says nothing about the skeleton: the mesh does not" in result.stderr
-    assert result.stderr.endswith("try another --method\n")
     told = json.loads((tmp_path / "r.json").read_text())
     assert told["mesh"]["far"] > 0.05
 

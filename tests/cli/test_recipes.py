@@ -22,7 +22,7 @@ def made(invoke, scans, tmp_path):
 
 @pytest.mark.parametrize("recipe", ["r.toml", "s.json"])
 def test_a_run_is_repeated_by_its_recipe_or_that_in_its_result(invoke, scans, tmp_path, made, recipe):
-    words = ("skeletonize", scans / "nan.ply", "--recipe", recipe, "-o", "again.json", "--save-recipe", "b.toml")
+    words = ("skeletonize", scans / "nan.ply", "--pipeline", recipe, "-o", "again.json", "--save-recipe", "b.toml")
     assert json.loads(invoke(*words, "--json").stdout)["files"] == ["again.json", "b.toml"]
     again = read_skeleton(tmp_path / "again.json")
     for name in ("vertices", "edges", "radii", "points", "vertex_of_point"):
@@ -46,15 +46,14 @@ def test_refused_before_anything_runs(refused, scans, tmp_path, made, no_run, mo
     odd = glsk_o3d.RingBuilder() | odd | glsk_o3d.Connector() | glsk_o3d.Refiner()
     monkeypatch.setitem(pipelines.PIPELINES, "odd", lambda: odd)
     for code, words, message in (
-        (1, "skeletonize SCAN --recipe gap.json -o a.ply", "gap.json: pipeline[5].reducer: a recipe cannot"),
-        (1, "skeletonize SCAN --recipe gone.json -o a.ply", "gone.json: pipeline[0].filter: no filter is"),
-        (2, "skeletonize SCAN --recipe r.toml --save-recipe ./r.toml -o a.ply", "is an input"),
+        (1, "skeletonize SCAN --pipeline gap.json -o a.ply", "gap.json: pipeline[5].reducer: a recipe cannot"),
+        (1, "skeletonize SCAN --pipeline gone.json -o a.ply", "gone.json: pipeline[0].filter: no filter is"),
+        (2, "skeletonize SCAN --pipeline r.toml --save-recipe ./r.toml -o a.ply", "is an input"),
         (2, "skeletonize SCAN --save-recipe a.json -o a.json", "a.json: is named twice"),
         (2, "skeletonize SCAN --save-recipe a.json", "nothing to write"),
-        (2, "skeletonize SCAN --recipe r.toml --pipeline wen2024 -o a.ply", "give one of them"),
-        (1, "skeletonize SCAN --recipe none.toml -o a.ply", "none.toml: No such file"),
-        (1, "skeletonize SCAN --recipe bad.json -o a.ply", "bad.json: pipeline[0].k: must be at least"),
-        (2, "skeletonize SCAN --recipe part.json -o a.ply", "not lead from a cloud to a skeleton"),
+        (1, "skeletonize SCAN --pipeline none.toml -o a.ply", "none.toml: No such file"),
+        (1, "skeletonize SCAN --pipeline bad.json -o a.ply", "bad.json: pipeline[0].k: must be at least"),
+        (2, "skeletonize SCAN --pipeline part.json -o a.ply", "not lead from a cloud to a skeleton"),
         (1, "skeletonize SCAN --pipeline odd -o a.ply --save-recipe a.json", "pipeline[1].reducer: a recipe cannot"),
     ):
         assert message in refused(code, *words.replace("SCAN", str(scans / "sample.ply")).split())

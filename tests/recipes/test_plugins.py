@@ -226,15 +226,12 @@ def test_names_that_are_taken(install, name, owner):
     assert catalogue()[name] is before
 
 
-@pytest.mark.usefixtures("example")
-@pytest.mark.parametrize(
-    "entries",
-    ["[glsk_o3d.filters]\nno equals sign\n", "[glsk_o3d.filters\nA = b:A\n", "[ glsk_o3d.filters ]\nA = b:A\n"],
-)
-def test_a_malformed_file_of_entry_points(install, entries):
-    install("glsk-garbled", "1", "", entries)
-    assert "the plugins of glsk-garbled left out: its entry_points.txt is malformed" in only_warning(catalogue)
-    assert "Voxel" in catalogue()
+def test_a_malformed_file_of_entry_points(install):
+    install("glsk-garbled", "1", "", "[glsk_o3d.filters]\nno equals sign\n")
+    assert only_warning(catalogue).startswith(
+        "all plugins left out: the entry points of an installed package are malformed"
+    )
+    assert "RingBuilder" in catalogue()
 
 
 def test_a_distribution_found_twice_is_one(example, tmp_path, monkeypatch):

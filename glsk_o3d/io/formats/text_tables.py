@@ -17,7 +17,6 @@ from typing import NamedTuple, TextIO
 
 import numpy as np
 
-from ...interop.packages import following_open3d
 from ..paths import check_line, check_promised
 from ..scan import COLOR_CHANNELS, NORMAL_NAMES, NoPoints, Scan, named_attributes, unit_colors
 
@@ -169,8 +168,7 @@ def _rows(stream: TextIO, layout: Layout, path: Path) -> np.ndarray:
             found.extend(row)
     rows = np.array(found).reshape(-1, len(layout.columns))
     if lost:
-        with following_open3d():
-            _log.warning("%s: %d of %d lines hold no point and were skipped", path, lost, lost + len(rows))
+        _log.warning("%s: %d of %d lines hold no point and were skipped", path, lost, lost + len(rows))
     return rows
 
 
