@@ -50,9 +50,7 @@ def pull_back_detached(skeleton: Skeleton) -> Skeleton:
     return replace(skeleton, vertices=skeleton.vertices + back[:, None] * mean)
 
 
-def fit_axis(
-    skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = None, settle: bool = False
-) -> Skeleton:
+def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = None, settle: bool = False) -> Skeleton:
     r"""Move the vertices to the axis of the surface; measure how well the points say where it is, and how far it is.
 
     The plane through a point p of a limb, spanned by its normal n and the tangent t of the axis, contains the axis:

@@ -16,9 +16,9 @@ from glsk_o3d.refinement.sections import measure_sections
 R = 0.15  # of the tubes
 
 
-def fit_axis(skeleton, passes):
+def fit_axis(skeleton, passes, **options):
     """Vertices, confidence and radii after a fit."""
-    fitted = axis_fit.fit_axis(skeleton, passes)
+    fitted = axis_fit.fit_axis(skeleton, passes, **options)
     return fitted.vertices, fitted.confidence, fitted.radii
 
 
@@ -73,6 +73,26 @@ def test_a_curve_comes_to_the_axis_of_an_arc_outside_its_points(degrees, placed)
     """Not to the centroid; the axis of less than half a tube is beside all of its points."""
     turned, turn = placed(tube((0, R), arc=np.deg2rad(degrees)))
     assert off_axis(fit_axis(turned, 15)[0] @ turn.T).max() < 0.02 * R
+
+
+@pytest.mark.parametrize("degrees", [360, 180, 120])
+def test_settling_leaves_the_axis_of_an_arc_that_says_where_it_is(degrees):
+    assert off_axis(fit_axis(tube(arc=np.deg2rad(degrees)), 3, settle=True)[0]).max() < 0.02 * R
+
+
+@pytest.mark.parametrize("degrees", [20, 40, 60])
+def test_a_leaf_seen_from_one_side_keeps_its_curve(degrees):
+    """It is as thick as its arc is deep, and the normals meet far behind it."""
+    half = np.deg2rad(degrees) / 2
+    leaf = tube(arc=2 * half)
+    assert (
+        off_axis(fit_axis(leaf, 3)[0]).max() < 0.3 * R
+    )  # where they meet, or as far as a curve may be from its points
+    behind = R - fit_axis(leaf, 12, settle=True)[0][2:-2, 2]
+    # by the closed form: of the squared normals a stand across, and the centroid is R sin(half) / half from the axis
+    across = (1 - np.sin(2 * half) / (2 * half)) / 2
+    pull = 1 - across / (0.5 - 1 / np.pi)
+    np.testing.assert_allclose(behind, R - R * pull / (pull + across) * np.sin(half) / half, atol=0.03 * R)
 
 
 def test_a_polygon_comes_to_the_centre_circle_of_a_torus():

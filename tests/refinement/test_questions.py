@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glsk_o3d import Report, skeletonize
+from glsk_o3d import Connector, Contractor, LPRReducer, Report, pipelines, samples, skeletonize
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
 from glsk_o3d.numerics.winding import AREA_NEIGHBOURS, point_areas
 from glsk_o3d.refinement.evidence import Evidence
@@ -102,13 +102,27 @@ def test_the_object_is_beside_a_strand_and_nothing_beside_a_limb(turn):
     x, y = (grid.ravel() for grid in np.mgrid[-2:2:0.08, -1:1:0.08])
     plate = np.concatenate([np.column_stack([x, y, np.full(len(x), z)]) for z in (-0.1, 0.1)])
     out = np.repeat([-Z, Z], len(x), axis=0)
-    strand = np.array([[0, t, 0] for t in (0, 0.2, 0.8)])
-    assert _beside(evidence_of(plate @ turn, out @ turn), [strand @ turn], np.array([0.3])) > 0.65  # it has no rim
+    strand, width = np.array([[0, t, 0] for t in (0, 0.2, 0.8)]), np.tile([1.0, 0, 0], (3, 1))
+    flat = evidence_of(plate @ turn, out @ turn)
+    # it has no rim
+    assert _beside(flat, strand @ turn, width @ turn, [np.arange(3)], np.array([0.3])) > 0.65
     along, t = (grid.ravel() for grid in np.mgrid[-2:2:0.08, 0 : 2 * np.pi : 0.26])
     tube = np.column_stack([along, 0.3 * np.cos(t), 0.3 * np.sin(t)])
     out = np.column_stack([np.zeros(len(t)), np.cos(t), np.sin(t)])
-    limb = np.array([[0, 0, 0], [1.5, 0, 0.0]])
-    assert _beside(evidence_of(tube @ turn, out @ turn), [limb @ turn], np.array([0.3])) < 0.05
+    limb, width = np.array([[0, 0, 0], [1.5, 0, 0.0]]), np.tile([0, 1.0, 0], (2, 1))
+    assert (
+        _beside(evidence_of(tube @ turn, out @ turn), limb @ turn, width @ turn, [np.arange(2)], np.array([0.3])) < 0.05
+    )
+
+
+def test_limbs_do_not_depend_on_how_the_object_is_turned(refine, placed):
+    """Nor on the order of the points, of which some are taken to say how far a branch stands out."""
+    raw = (pipelines.rings() | Contractor(reducer=LPRReducer()) | Connector())(samples.sauropod(3000).points)
+    turned, _ = placed(raw)
+    again = [refine(skeleton, limb=1e-9, recentre=1).report.decisions for skeleton in (raw, turned)]
+    assert len(again[0]) > 4
+    sure, also = (sorted(each.probability for each in decisions) for decisions in again)
+    np.testing.assert_allclose(sure, also, atol=1e-6)
 
 
 def twig(piped, reach, tubes=None):
