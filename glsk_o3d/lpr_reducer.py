@@ -42,8 +42,8 @@ class LPRReducer(Filter[Contraction]):
     -----
     As in the published code, the Laplacian coordinates are those before the solve, :math:`s_i - \psi' s_i(0)` is at
     least 1e-4, and V2 lacks the factor :math:`W_H`. As in the paper, the curvature term compares with the point's own
-    Laplacian coordinate. Where that lies in the tangent plane, or is nothing beside the ring, the ring is projected on the
-    tangent plane instead.
+    Laplacian coordinate. Where that lies in the tangent plane, or is nothing beside the ring, the ring is projected on
+    the tangent plane instead.
 
     References
     ----------

@@ -25,7 +25,7 @@ FIT_WIDEST = 10.0  # fitted: half width over the spacing of the vertices, at mos
 FIT_STAY = 0.1  # fitted: weight of staying where it was, per point
 FIT_CENTROID = 0.5  # fitted: weight of the points themselves where their normals say nothing
 # derived: share of the squared normals of a quarter of a tube that stand across the others: of less, they do not say
-FIT_OPEN = (1 - 2 / np.pi) / 2  # how deep behind them the axis is; of half a tube it is .5
+FIT_OPEN = 1 / 2 - 1 / np.pi  # how deep behind them the axis is; of half a tube it is .5
 FIT_WALK = 3  # measured: vertices by which a point may move along the curve in a pass
 # derived: over the diagonal, how far out of the box of its points an axis may be: they show a third of a tube at least,
 FIT_BEYOND = 0.05  # whose axis is half a radius away from it, and a tube that is seen so is some ten radii long
@@ -222,7 +222,7 @@ def _spread_width(moments: np.ndarray) -> np.ndarray:
 
 
 def _solve(x: np.ndarray, near: _Nearest, p: np.ndarray, pull: np.ndarray, pattern: _Pattern) -> np.ndarray:
-    """The minimum of the energy in `fit_axis`, with K of every edge: one sparse, symmetric, positive definite system."""
+    """The minimum of the energy in `fit_axis`, K at every edge: one sparse, symmetric, positive definite system."""
     ends, inner, beside = pattern.ends, pattern.inner, pattern.beside
     m, e = len(x), len(ends)
     along = near.tangent[:, :, None] * near.tangent[:, None]
