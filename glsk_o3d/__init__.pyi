@@ -25,10 +25,9 @@ from .errors import (
     StageError,
 )
 from .interop.clouds import Cloud
-from .io.annotation import annotate, annotate_contraction
-from .io.cylinders import save_cylinders
+from .io.annotation import annotate
 from .io.formats.gltf import save_rig
-from .io.geometry import to_line_set, to_tensor_line_set, to_tubes
+from .io.geometry import to_line_set, to_tubes
 from .io.meshes import save_mesh
 from .io.scans import read_cloud, read_tensor_cloud, save_tensor_cloud
 from .io.skeletons import read_skeleton, read_truth, save_skeleton
@@ -95,7 +94,6 @@ __all__ = [
     "Tracer",
     "analysis",
     "annotate",
-    "annotate_contraction",
     "annotate_file",
     "batch",
     "crosscheck",
@@ -111,7 +109,6 @@ __all__ = [
     "remove_redundant_points",
     "rerun",
     "save_assessment",
-    "save_cylinders",
     "save_mesh",
     "save_preview",
     "save_recipe",
@@ -124,6 +121,5 @@ __all__ = [
     "to_line_set",
     "to_pymeshlab",
     "to_recipe",
-    "to_tensor_line_set",
     "to_tubes",
 ]

@@ -65,7 +65,7 @@ def tree(
     skeleton: Annotated[Path, argument("SKELETON", "Of a tree, with radii: 'glsk skeletonize --pipeline tree'.")],
     output: Annotated[
         list[Path] | None,
-        output_option("FILE", "Write cylinders: csv, or in metres qsm.csv (rTwig), mat (TreeQSM), txt (treetools)."),
+        output_option("FILE", "Write cylinders, as csv."),
     ] = None,
     root: Root = None,
     up: Annotated[str | None, option("AXIS", "What points up, x to -z; else as it was grown, or z.")] = None,
@@ -78,18 +78,16 @@ def tree(
     JSON and npz files say where the tree grows from, and keep the points that the stem's diameter is measured on. All
     is in metres if --unit says what a unit of the file is; only a csv file of cylinders is in the units of the file.
     """
-    from .. import read_skeleton, save_cylinders
+    from .. import read_skeleton
     from ..analysis import cylinders, tree_measures
-    from ..io.cylinders import CYLINDER_ENDINGS, cylinders_ending
 
-    check_outputs([(path, CYLINDER_ENDINGS, "file is a table of cylinders") for path in output or []], skeleton)
+    check_outputs([(path, (".csv",), "file is a table of cylinders") for path in output or []], skeleton)
     curve = read_skeleton(skeleton)
     measures = tree_measures(curve, root, up=up, unit=unit)
     written = []
     for path in output or []:
-        save_cylinders(cylinders(curve, root), path, unit)
-        units = f"the units of {skeleton.name}" if cylinders_ending(path) == ".csv" else "metres"
-        written.append(f"{path}, in {units}")
+        cylinders(curve, root).to_csv(path)
+        written.append(f"{path}, in the units of {skeleton.name}")
     tell({"skeleton": str(skeleton), **asdict(measures)}, lambda: _print(measures), written)
 
 

@@ -59,7 +59,7 @@ def skeletonize(
     from .. import ContractionRecorder, recipes, save_mesh, to_tubes
     from ..interop.packages import require
     from ..io.meshes import WRITTEN_MESH_ENDINGS
-    from ..io.scans import WRITTEN_CLOUD_ENDINGS
+    from ..io.scans import WRITTEN_CLOUD_ENDING
     from ..resampling import with_support
     from .overrides import choose, grown_from
 
@@ -69,7 +69,7 @@ def skeletonize(
     results = [
         *skeleton_files(output, preview, report),
         (tubes, WRITTEN_MESH_ENDINGS, "tubes are a mesh"),
-        (labelled, WRITTEN_CLOUD_ENDINGS, "file is a cloud with labels"),
+        (labelled, (WRITTEN_CLOUD_ENDING,), "cloud with labels is PLY"),
     ]
     if all(path is None for path, *_ in results):
         raise WrongUsage("nothing to write: give -o, --tubes or --labelled, a --preview or a --report")
@@ -107,20 +107,17 @@ def _read(
 
     from .. import annotate_file, save_tensor_cloud
     from ..io.scans import read_scan
-    from ..io.streaming import STREAMED_ENDING, sample_for
+    from ..io.streaming import sample_for
 
     load_open3d()
-    if labelled is None or labelled.suffix.lower() == STREAMED_ENDING:
-        sample = sample_for(pipeline, scan, where, stream)
-        if sample is not None:
-            if not flags.quiet:
-                finite = np.isfinite(sample.point.positions.numpy()).all(axis=1)
-                n, total = int(finite.sum()), int(sample.point.sample_count.numpy()[finite].sum(dtype=np.int64))
-                taken = f"the skeleton is that of a sample of {n} of {total} points"
-                echo(f"{scan}: read in blocks: {taken if n < total else f'all {n} points are taken'}", err=True)
-            return sample, lambda skeleton, path: annotate_file(skeleton, scan, path, where=where)
-    elif stream:
-        raise WrongUsage(f"{labelled}: --stream writes a cloud with labels as {STREAMED_ENDING} alone")
+    sample = sample_for(pipeline, scan, where, stream)
+    if sample is not None:
+        if not flags.quiet:
+            finite = np.isfinite(sample.point.positions.numpy()).all(axis=1)
+            n, total = int(finite.sum()), int(sample.point.sample_count.numpy()[finite].sum(dtype=np.int64))
+            taken = f"the skeleton is that of a sample of {n} of {total} points"
+            echo(f"{scan}: read in blocks: {taken if n < total else f'all {n} points are taken'}", err=True)
+        return sample, lambda skeleton, path: annotate_file(skeleton, scan, path, where=where)
     read = read_scan(scan, where)  # what it is skeletonised from is the same, whether it is labelled or not
     cloud, whole = read.to_legacy(), None if labelled is None else read.to_tensor()
     return cloud, lambda skeleton, path: save_tensor_cloud(_labelled(skeleton, whole), path)

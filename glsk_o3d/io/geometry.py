@@ -11,7 +11,7 @@ from ..interop.packages import import_open3d
 from ..numerics.neighbourhoods import plane_axes
 from ..numerics.vectors import TINY, dot, unit
 from ..refinement.sections import measure_sections
-from ..skeleton import OF_VERTICES, Skeleton
+from ..skeleton import Skeleton
 from .colors import ColorChoice, shades
 
 
@@ -46,55 +46,12 @@ def to_line_set(skeleton: Skeleton, color: ColorChoice = "branch") -> Any:
     return lines
 
 
-def to_tensor_line_set(skeleton: Skeleton, color: ColorChoice | None = None) -> Any:
-    """A skeleton as a tensor line set on the CPU, with all attributes of vertices and edges.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-    color : as of `to_line_set`, optional
-
-    Returns
-    -------
-    open3d.t.geometry.LineSet
-        With ``point.positions`` (M, 3), ``point.radius``, ``point.confidence``, ``point.half_width``,
-        ``point.half_thickness`` and ``point.support`` (M, 1) float64, ``line.indices`` (E, 2) int64, ``line.branch``
-        (E, 1) int32 and, with a color, ``line.colors`` (E, 3) float64.
-
-    Raises
-    ------
-    InvalidParameterError, MissingPackageError
-
-    Examples
-    --------
-    >>> from glsk_o3d import skeletonize
-    >>> from glsk_o3d.samples import torus
-    >>> ring = skeletonize(torus(1000).points)
-    >>> to_tensor_line_set(ring).line.branch.shape[0] == len(ring.edges)
-    True
-    """
-    o3d, branch = import_open3d(), branch_of_edge(skeleton)
-    lines = o3d.t.geometry.LineSet()
-
-    def put(where: Any, name: str, values: np.ndarray, dtype: type, columns: int = 1) -> None:
-        where[name] = o3d.core.Tensor(np.ascontiguousarray(values, dtype).reshape(-1, columns))
-
-    put(lines.point, "positions", skeleton.vertices, float, 3)
-    for name, field in zip(("radius", *OF_VERTICES[1:]), OF_VERTICES, strict=True):
-        put(lines.point, name, getattr(skeleton, field), float)
-    put(lines.line, "indices", skeleton.edges, np.int64, 2)
-    put(lines.line, "branch", branch, np.int32)
-    if color is not None:
-        put(lines.line, "colors", shades(skeleton, color, branch, skeleton.edges), float, 3)
-    return lines
-
-
 def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float | None = None, sides: int = 16) -> Any:
     """A skeleton as a mesh of tubes, one for every branch, closed by half balls.
 
-    The tubes have the sections of the vertices, linear between them: ellipses with their half axes, or circles with
-    their radius if the skeleton has no points to determine the direction of the width. They overlap at junctions, where
-    round half balls form one ball. The cross-sections do not twist along the curve.
+    Their sections are ellipses with the half axes of the vertices, or circles with their radius if the skeleton has no
+    points to determine the direction of the width. They are linear between vertices, do not twist, and overlap at
+    junctions.
 
     Parameters
     ----------
@@ -110,8 +67,7 @@ def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float
     Returns
     -------
     open3d.geometry.TriangleMesh
-        With vertex colours and normals; triangles face outwards. ``open3d.t.geometry.TriangleMesh.from_legacy`` makes a
-        tensor mesh of it.
+        With vertex colours and normals; triangles face outwards.
 
     Raises
     ------
