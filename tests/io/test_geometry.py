@@ -1,16 +1,14 @@
-"""Skeletons as line sets of both APIs, and as tubes: closed, outward, as thick as they should be."""
+"""Skeletons as line sets, and as tubes: closed, outward, as thick as they should be."""
 
 from dataclasses import replace
 
 import numpy as np
-import open3d as o3d
 import pytest
 
-from glsk_o3d import InvalidParameterError, Skeleton, samples, skeletonize, to_line_set, to_tensor_line_set, to_tubes
+from glsk_o3d import InvalidParameterError, Skeleton, samples, skeletonize, to_line_set, to_tubes
 from glsk_o3d.io.colors import COLOR_NAMES
 from glsk_o3d.io.geometry import sweep
 from glsk_o3d.refinement.sections import measure_sections
-from glsk_o3d.skeleton import OF_VERTICES
 
 
 def graph(vertices, edges, radii):
@@ -24,22 +22,12 @@ def axis_of(sample):
 # ----------------------------------------------------------------------------------------------------------- line sets
 
 
-def test_line_sets_of_both_kinds_have_their_own_copy_of_the_graph(skeleton):
-    legacy, tensor = skeleton.to_line_set((0, 0.5, 1)), to_tensor_line_set(skeleton)
-    np.testing.assert_array_equal(np.asarray(legacy.points), skeleton.vertices)
-    np.testing.assert_array_equal(np.asarray(legacy.lines).reshape(-1, 2), skeleton.edges)
-    np.testing.assert_array_equal(np.asarray(legacy.colors), np.tile([0, 0.5, 1], (len(skeleton.edges), 1)))
-    assert isinstance(tensor, o3d.t.geometry.LineSet)
-    expected = {"positions": skeleton.vertices, "radius": skeleton.radii[:, None]}
-    expected |= {name: getattr(skeleton, name)[:, None] for name in OF_VERTICES[1:]}
-    assert set(tensor.point) == expected.keys()
-    for name, values in expected.items():
-        assert tensor.point[name].dtype == o3d.core.float64
-        np.testing.assert_array_equal(tensor.point[name].numpy(), values)
-    np.testing.assert_array_equal(tensor.line.indices.numpy(), skeleton.edges)
-    before = skeleton.vertices.copy()
-    tensor.point.positions += 1
-    legacy.translate((1, 1, 1))
+def test_a_line_set_has_its_own_copy_of_the_graph(skeleton):
+    lines, before = skeleton.to_line_set((0, 0.5, 1)), skeleton.vertices.copy()
+    np.testing.assert_array_equal(np.asarray(lines.points), skeleton.vertices)
+    np.testing.assert_array_equal(np.asarray(lines.lines).reshape(-1, 2), skeleton.edges)
+    np.testing.assert_array_equal(np.asarray(lines.colors), np.tile([0, 0.5, 1], (len(skeleton.edges), 1)))
+    lines.translate((1, 1, 1))
     np.testing.assert_array_equal(skeleton.vertices, before)
 
 
@@ -47,9 +35,8 @@ def test_line_sets_of_both_kinds_have_their_own_copy_of_the_graph(skeleton):
 @pytest.mark.parametrize("color", [*COLOR_NAMES, (0.1, 0.2, 0.3)])
 def test_in_colour_without_edges(count, color):
     lone = Skeleton(np.zeros((count, 3)), (), np.ones(count), (), (), (), confidence=np.ones(count))
-    legacy, tensor = to_line_set(lone, color), to_tensor_line_set(lone, color)
-    assert (len(legacy.points), len(legacy.lines), len(legacy.colors)) == (count, 0, 0)
-    assert tuple(tensor.line.colors.shape) == (0, 3)
+    lines = to_line_set(lone, color)
+    assert (len(lines.points), len(lines.lines), len(lines.colors)) == (count, 0, 0)
     assert len(to_tubes(lone, color).vertex_colors) == len(to_tubes(lone, color).vertices)
 
 
@@ -63,14 +50,8 @@ def test_line_sets_in_colour():
     branched = skeletonize(samples.y_junction(800).points)
     for color, distinct in (("branch", 3), ((0.1, 0.2, 0.3), 1), ("radius", None), ("confidence", None)):
         legacy = np.asarray(to_line_set(branched, color).colors)
-        np.testing.assert_array_equal(to_tensor_line_set(branched, color).line.colors.numpy(), legacy)
         count = len(np.unique(legacy, axis=0))
         assert count == distinct if distinct else count > 5
-    plain = to_tensor_line_set(branched)
-    assert "colors" not in plain.line
-    for path, branch in zip(branched.branches, range(3), strict=True):
-        rows = np.isin(branched.edges, path).all(axis=1)
-        assert (plain.line.branch.numpy()[rows] == branch).all()
     bare = graph(branched.vertices, branched.edges, np.full(len(branched.radii), np.nan))
     for color in ("radius", "confidence", "thickness"):
         assert (np.asarray(to_line_set(bare, color).colors) == 0.6).all()

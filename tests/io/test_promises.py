@@ -1,6 +1,5 @@
 """Files that promise what they do not hold, unfold to more than memory, or name others: all are refused."""
 
-import json
 import os
 import re
 import subprocess
@@ -16,7 +15,7 @@ from glsk_o3d.io.paths import ALWAYS_TAKEN, check_budget, check_promised
 from glsk_o3d.io.scans import read_mesh, read_scan
 
 POINTS = np.random.default_rng(0).normal(size=(400, 3)).round(3)
-REFUSAL = r"(promises|its \d+ bytes would take|may be cut|stands in two|nested|elements inside|DOCTYPE|names another)"
+REFUSAL = r"(promises|its \d+ bytes would take|may be cut|a line has 3000000 numbers)"
 LIMITED = """
 import resource, sys
 from glsk_o3d.errors import FileFormatError
@@ -29,7 +28,7 @@ except FileFormatError as error:
 """
 
 
-def refused(path, says=REFUSAL):
+def refused(path):
     """In a process that may take 3 GB of memory and 60 seconds, and that nothing hangs or kills."""
     done = subprocess.run(
         [sys.executable, "-c", LIMITED, path], capture_output=True, text=True, timeout=60, check=False
@@ -37,7 +36,7 @@ def refused(path, says=REFUSAL):
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("\n") == 1
     assert path.name in done.stdout
-    assert re.search(says, done.stdout), done.stdout
+    assert re.search(REFUSAL, done.stdout), done.stdout
 
 
 def test_one_rule():
@@ -75,20 +74,6 @@ def test_points_that_an_e57_file_does_not_hold(lies, tmp_path, promised):
     refused(tmp_path / "s.e57")
 
 
-@pytest.mark.parametrize("format", [3, 7])
-def test_points_that_a_laz_file_does_not_hold(tmp_path, format):
-    laspy = pytest.importorskip("laspy")
-    scan = laspy.LasData(laspy.LasHeader(point_format=format, version="1.2" if format == 3 else "1.4"))
-    scan.x, scan.y, scan.z = POINTS.T
-    scan.write(tmp_path / "s.laz")
-    assert len(read_scan(tmp_path / "s.laz")) == 400
-    data, at = bytearray((tmp_path / "s.laz").read_bytes()), 107 if format == 3 else 247
-    data[at : at + 4] = (401).to_bytes(4, "little")
-    (tmp_path / "s.laz").write_bytes(data)
-    with pytest.raises(FileFormatError, match=r"s\.laz: not a valid \.laz file"):
-        read_scan(tmp_path / "s.laz")
-
-
 @pytest.mark.parametrize("name", ["c.ply", "c.pcd", "c.pts", "c.off"])
 def test_numbers_that_text_cuts(tmp_path, name):
     path = tmp_path / name
@@ -107,20 +92,6 @@ def test_numbers_that_text_cuts(tmp_path, name):
     assert len(read_scan(path)) == 400
 
 
-@pytest.mark.parametrize(
-    ("place", "key"), [("accessors", "count"), ("bufferViews", "byteLength"), ("buffers", "byteLength")]
-)
-@pytest.mark.parametrize("more", [1, 10**6])
-def test_rows_that_a_gltf_file_does_not_hold(mesh, place, key, more):
-    tree = json.loads(mesh.read_bytes())
-    for i, held in [*enumerate(tree[place])][-1 if place != "accessors" else 0 :]:  # of others there is more behind
-        wrong = json.loads(mesh.read_bytes())
-        wrong[place][i][key] = held[key] + more
-        mesh.with_name("w.gltf").write_text(json.dumps(wrong))
-        with pytest.raises(FileFormatError, match=r"promises|its vertices are"):
-            read_scan(mesh.with_name("w.gltf"))
-
-
 def test_a_vertex_too_many_does_not_take_the_bytes_of_a_face(tmp_path):
     o3d.io.write_triangle_mesh(str(tmp_path / "m.ply"), o3d.geometry.TriangleMesh.create_torus(1, 0.3, 6, 5))
     whole = (tmp_path / "m.ply").read_bytes()
@@ -131,39 +102,6 @@ def test_a_vertex_too_many_does_not_take_the_bytes_of_a_face(tmp_path):
 
 
 # --------------------------------------------------------------------------------------------------------------- bombs
-
-
-@pytest.fixture
-def mesh(tmp_path):
-    path = tmp_path / "m.gltf"
-    o3d.io.write_triangle_mesh(str(path), o3d.geometry.TriangleMesh.create_torus(1, 0.3, 6, 5))
-    return path
-
-
-@pytest.mark.parametrize(("children", "deep"), [(2, 30), (1, 200000)])
-def test_nodes_that_repeat_or_are_nested(mesh, children, deep):
-    tree = json.loads(mesh.read_bytes())
-    tree["nodes"] = [{"mesh": 0}, *({"children": [i] * children} for i in range(deep))]
-    tree["scenes"][0]["nodes"] = [deep]
-    mesh.write_text(json.dumps(tree))
-    refused(mesh)
-
-
-def test_nodes_without_a_mesh_may_be_as_deep_as_an_armature(mesh):
-    before = read_scan(mesh)
-    tree = json.loads(mesh.read_bytes())
-    tree["nodes"] += [{"children": [i]} for i in range(2, 5000)] + [{}]
-    tree["scenes"][0]["nodes"] = [0, 1]
-    mesh.write_text(json.dumps(tree))
-    np.testing.assert_array_equal(read_scan(mesh).positions, before.positions)
-
-
-def test_meshes_that_are_placed_too_often(mesh):
-    tree = json.loads(mesh.read_bytes())
-    tree["nodes"] = [{"mesh": 0} for _ in range(100000)]
-    tree["scenes"][0]["nodes"] = list(range(100000))
-    mesh.write_text(json.dumps(tree))
-    refused(mesh, r"its \d+ bytes would take \d+, and at most \d+ are allowed, 16 times as many")
 
 
 def test_values_that_a_pcd_file_does_not_hold(tmp_path):
@@ -184,50 +122,26 @@ def test_copies_are_unpacked_in_time(lies, tmp_path):
     assert len(read_scan(tmp_path / "c.pcd")) == 6 * 10**6 + 1
 
 
-def test_a_width_and_a_number_of_points(tmp_path):
-    head = "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 3\nHEIGHT 1\nPOINTS 2\n"
-    (tmp_path / "c.pcd").write_text(f"{head}DATA ascii\n1 2 3\n4 5 6\n")
-    with pytest.raises(FileFormatError, match="promises 2 points, and another width"):
-        read_scan(tmp_path / "c.pcd")
-
-
-@pytest.mark.parametrize("what", ["cloud .e57 deep", "cloud .e57 entities", "cloud .e57 constant", "cloud .xyz wide"])
+@pytest.mark.parametrize("what", ["cloud .e57 constant", "cloud .xyz wide"])
 def test_what_no_scanner_writes(lies, tmp_path, what):
     pytest.importorskip("pye57")
     path = tmp_path / f"c{what.split()[1]}"
     path.write_bytes(lies.BOMBS[what](10**6))
-    refused(path, f"{REFUSAL}|a line has 3000000 numbers")
+    refused(path)
 
 
 # --------------------------------------------------------------------------------------------------------------- named
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
-@pytest.mark.parametrize("name", ["cloud .obj mtllib", "cloud .obj goes on", "cloud .obj map", "cloud .gltf image"])
+@pytest.mark.parametrize("name", ["cloud .obj mtllib", "cloud .obj goes on", "cloud .obj map"])
 @pytest.mark.parametrize("other", ["pipe", "/dev/zero", "none"])
 def test_looks_are_not_read(lies, tmp_path, name, other):
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "given.mtl").write_text(f"newmtl a\nmap_Kd {other}\n")
     path = tmp_path / f"m{name.split()[1]}"
     path.write_bytes(lies.NAMING[name](other))
-    assert len(read_scan(path)) in (3, 30)
-
-
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
-def test_only_files_are_read_that_a_file_names(lies, tmp_path):
-    os.mkfifo(tmp_path / "pipe")
-    (tmp_path / "folder").mkdir()
-    (tmp_path / "loop").symlink_to(tmp_path / "loop")
-    for other, says in (
-        ("pipe", "pipe or a device"),
-        ("/dev/zero", "device"),
-        ("folder", "folder"),
-        ("loop", ""),
-        ("none", "no such"),
-    ):
-        (tmp_path / "m.gltf").write_bytes(lies.NAMING["cloud .gltf buffer"](other))
-        with pytest.raises(FileFormatError, match=rf"m\.gltf.*{says}"):
-            read_scan(tmp_path / "m.gltf")
+    assert len(read_scan(path)) == 3
 
 
 # -------------------------------------------------------------------------------------------------------------- errors

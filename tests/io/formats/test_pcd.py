@@ -73,7 +73,7 @@ def test_compressed_fields_that_open3d_would_crash_on(tmp_path, fields, attribut
         ("POINTS 2", "POINTS -5", "negative count"),
         ("POINTS 2", "POINTS 99999999999", "promises 99999999999"),
         ("DATA", "DATUM", "no DATA"),
-        ("FIELDS x y", "FIELDS x w", "no fields x, y and z"),
+        ("FIELDS x y", "FIELDS x w", "it has no x, y and z"),
         ("POINTS 2", "POINTS 3", "promises 3 points and holds 2"),
         ("COUNT 1 1 1 1", "COUNT 1 1 1", "c.pcd"),
     ],
