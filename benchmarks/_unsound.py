@@ -226,7 +226,6 @@ USES: tuple[Callable[[Skeleton, Path], object], ...] = (
         lambda it, _, color=color: glsk.to_line_set(it, color)
         for color in ("branch", "order", "radius", "confidence", "support", "thickness")
     ),
-    lambda it, _: glsk.to_tensor_line_set(it, "radius"),
     lambda it, _: glsk.to_tubes(it),
     lambda it, _: glsk.to_tubes(it, radius=0.1),
     lambda it, _: glsk.to_pymeshlab(it),
@@ -241,10 +240,6 @@ USES: tuple[Callable[[Skeleton, Path], object], ...] = (
     lambda it, _: analysis.find_loops(it),
     lambda it, _: analysis.tree_measures(it),
     lambda it, folder: analysis.cylinders(it).to_csv(folder / "c.csv"),
-    *(
-        lambda it, folder, ending=ending: glsk.save_cylinders(analysis.cylinders(it), folder / f"c{ending}")
-        for ending in (".csv", ".qsm.csv", ".mat")
-    ),
     lambda it, _: analysis.assess(it, it.points),
     lambda it, _: analysis.assess(it, samples.torus(100).points),
     lambda it, _: analysis.compare(it, samples.torus(100)),

@@ -36,7 +36,7 @@ settings.load_profile("suite")
 
 SLOW = """
 analysis/test_assessment analysis/test_curvature analysis/test_forestry analysis/test_grasp batch benchmark cli
-crosscheck interop io/formats io/test_colors io/test_cylinders io/test_skeletons io/test_streaming io/test_tubes
+crosscheck interop io/formats io/test_colors io/test_skeletons io/test_streaming io/test_tubes
 meshlab recipes ros2 samples test_architecture test_benchmarks test_calibrate test_constants test_digest
 test_equations test_examples test_external test_filter_scripts test_fuzz test_gallery test_grasps test_leaderboard
 test_packaging test_site test_speed test_tiles test_trees test_typing viewing

@@ -67,7 +67,7 @@ def line(tmp_path):
     ("word", "x"), [("x", -1), ("-x", 2), ("thickest", 2), ("1", 0), ("0.9,0.1,0", 1), ("-0.9,0.1,0", -1)]
 )
 def test_a_root_in_all_words(invoke, line, tmp_path, word, x):
-    names = [f"t.{name}" for name in ("swc", "mtg", "plant.csv", "urdf", "glb")]
+    names = [f"t.{name}" for name in ("swc", "urdf", "glb")]
     result = invoke("convert", line, *names, "--root", word)
     assert (result.exit_code, result.stderr) == (0, ""), result.output
     for name in names:
@@ -127,13 +127,3 @@ def test_alone_it_has_its_tubes_and_loops_are_cut_if_one_says_so(invoke, ring_fi
     bones = save_rig(read_skeleton(tmp_path / ring_file), tmp_path / "expected.glb", cut_loops=True)
     assert result.stdout == f"{len(bones.edges)} bones move the skeleton's own surface\nwrote r.glb\n"
     assert (tmp_path / "r.glb").read_bytes() == (tmp_path / "expected.glb").read_bytes()
-
-
-def test_an_armature_alone(invoke, y, tmp_path):
-    bones = save_rig(read_skeleton(tmp_path / y), tmp_path / "expected.bvh", up="y")
-    assert (
-        invoke("rig", y, "-o", "r.bvh", "--up", "y").stdout
-        == f"{len(bones.edges)} bones move no surface\nwrote r.bvh\n"
-    )
-    assert (tmp_path / "r.bvh").read_bytes() == (tmp_path / "expected.bvh").read_bytes()
-    assert invoke("rig", y, "-o", "r.fbx").exit_code == 2

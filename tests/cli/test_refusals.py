@@ -29,7 +29,7 @@ TABLE = """
     2 convert y.ply a.ply --root x                         | for others use 'glsk edit'
     2 rig y.ply                                            | nothing to write: give one output with -o
     2 rig y.ply -o a.glb -o b.glb                          | rig writes one file: give one output with -o
-    2 rig none.ply -o r.fbx                                | r.fbx: the rig is glTF or BVH and its name ends in .glb
+    2 rig none.ply -o r.fbx                                | r.fbx: the rig is glTF and its name ends in .glb
     2 rig y.ply -o r.glb --up x                            | up = 'x': must be one of z, y
     1 rig y.ply none.ply -o r.glb                          | none.ply: no such file
     1 rig y.ply y.ply -o r.glb                             | y.ply: is a skeleton, not a scan

@@ -47,7 +47,7 @@ def save(points, path, **attributes):
     cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(points))
     for name, values in attributes.items():
         cloud.point[name] = o3d.core.Tensor(values)
-    save_tensor_cloud(cloud, path)
+    assert o3d.t.io.write_point_cloud(str(path), cloud)
 
 
 @pytest.fixture(scope="module")

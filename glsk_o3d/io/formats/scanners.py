@@ -3,10 +3,11 @@
 They are read by laspy with lazrs (extra ``las``) and by pye57 (extra ``e57``).
 """
 
+import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from ...interop.packages import require, require_for
 from ..paths import check_budget, check_promised
 from ..scan import COLOR_CHANNELS, NoPoints, Scan, brightest, scan_of
 
+VLR_BYTES = 54  # published: LAS 1.4 R15, of the head of a record
+LAYERED = 3  # published: LASzip's way to pack in which chunks have layers
+LAYERS = {10: 9, 11: 1, 12: 2, 13: 1}  # published: of the parts of a point, by their types; others have one per byte
 _E57_PLACE = ["cartesianX", "cartesianY", "cartesianZ"]
 _E57_COLORS = dict(zip(("colorRed", "colorGreen", "colorBlue"), COLOR_CHANNELS, strict=True))
 _E57_INVALID = "cartesianInvalidState"
@@ -27,13 +31,46 @@ def blocks(path: Path, rows: int, bare: bool) -> tuple[int, Iterator[Scan]]:
     """What is 0 in all of a block is unset in it."""
     require_for(path.suffix)
     size = path.stat().st_size
-    with _opened(path) as file:
-        header = file.header
-    if header.are_points_compressed:
-        check_budget(header.point_count * header.point_format.size, size)
-    else:
-        check_promised(header.point_count, (size - header.offset_to_point_data) // header.point_format.size)
-    return header.point_count, _blocks(path, rows, bare)
+    with path.open("rb") as stream:
+        head, start, records = struct.unpack("<94xHII", stream.read(104).ljust(104, b"\0"))
+        check_promised(start, size, "bytes before its points")
+        check_promised(records, (start - head) // VLR_BYTES, "records")  # laspy would look for each
+        stream.seek(0)
+        header = require("laspy").LasHeader.read_from(stream)
+        n, room = header.point_count, size - header.offset_to_point_data
+        if header.are_points_compressed:
+            check_budget(n * header.point_format.size, size)
+            _check_chunks(stream, header, size)
+        else:
+            check_promised(n, room // header.point_format.size)
+    return n, _blocks(path, rows, bare)
+
+
+def _check_chunks(stream: BinaryIO, header: Any, size: int) -> None:
+    """Raise ValueError where a LAZ file of so many bytes promises more: lazrs would believe it, and not come back."""
+
+    def number(place: int, length: int) -> int:
+        stream.seek(place)
+        return int.from_bytes(stream.read(length), "little")
+
+    record = header.vlrs.get("LasZipVlr")[0].record_data
+    items, chunk = np.frombuffer(record[34:], "<u2").reshape(-1, 3), int.from_bytes(record[12:16], "little")
+    point = int(items[:, 1].sum())
+    layers = sum(LAYERS.get(kind, width) for kind, width, _ in items.tolist()) if record[0] == LAYERED else 0
+    place = header.offset_to_point_data + 8
+    table = number(place - 8, 8)
+    if table == 2**64 - 1:  # it was not known yet, and stands at the end
+        table = number(size - 8, 8)
+    chunks = number(min(table, size) + 4, 4)
+    # each has a whole point; of those that the table does not have lazrs would believe all
+    sound = point == header.point_format.size and place <= table < size
+    sound = sound and -(-header.point_count // (chunk or 1)) <= chunks <= size / max(point, 1)
+    for _ in range(chunks if sound and layers else 0):
+        lengths = [number(place + point + 4 * layer, 4) for layer in range(1, 1 + layers)]
+        place += point + 4 * (1 + layers) + sum(lengths)
+        sound = sound and place <= table
+    if not sound:
+        raise ValueError("its chunks, or their table, promise more than it holds: it is damaged")
 
 
 def _blocks(path: Path, rows: int, bare: bool) -> Iterator[Scan]:
