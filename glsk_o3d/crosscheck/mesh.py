@@ -14,7 +14,6 @@ from ..contractor import Contractor
 from ..errors import InvalidCloudError, InvalidParameterError, SkeletonWarning
 from ..interop.clouds import to_point_cloud
 from ..interop.packages import import_open3d, require
-from ..io.meshes import mesh_arrays
 from ..lpr_reducer import LPRReducer
 from ..numerics.cotangent import WEIGHT_CAP
 from ..numerics.frame import MIN_POINTS
@@ -74,6 +73,29 @@ def without_bare(vertices, faces):
     """The mesh without vertices that have no triangle, and the faces renumbered."""
     used, renumbered = np.unique(faces, return_inverse=True)
     return vertices[used], renumbered.reshape(-1, 3)
+
+
+def mesh_arrays(mesh):
+    """Vertices, (V, 3) float64, and triangles, (F, 3) int64, of a mesh of Open3D or a pair of arrays.
+
+    InvalidParameterError if it is none, has no triangles, or coordinates or indices are of no use.
+    """
+    try:
+        if hasattr(mesh, "triangle"):
+            parts = mesh.vertex.positions.cpu().numpy(), mesh.triangle.indices.cpu().numpy()
+        else:
+            parts = (mesh.vertices, mesh.triangles) if hasattr(mesh, "triangles") else mesh
+        vertices, faces = (np.asarray(part) for part in parts)
+    except Exception as error:  # whatever a foreign object raises
+        raise InvalidParameterError(f"a {type(mesh).__name__} is no triangle mesh: {error}") from error
+    if vertices.shape[1:] != (3,) or faces.shape[1:] != (3,) or len(faces) == 0:
+        shapes = f"{vertices.shape} and {faces.shape}"
+        raise InvalidParameterError(f"a mesh needs (V, 3) vertices and (F, 3) triangles, not {shapes}")
+    if vertices.dtype.kind not in "iuf" or not np.isfinite(vertices).all():
+        raise InvalidParameterError("the mesh has vertices that are not finite numbers")
+    if faces.dtype.kind not in "iu" or faces.min() < 0 or faces.max() >= len(vertices):
+        raise InvalidParameterError("a triangle of the mesh names a missing vertex")
+    return vertices.astype(float), faces.astype(np.int64)
 
 
 def surface_of(state, mesh):

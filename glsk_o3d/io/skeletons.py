@@ -79,9 +79,8 @@ def save_skeleton(
     cut_loops : bool
         For formats of trees: keep the spanning forest of least length, instead of refusing loops.
     root : str, int or (x, y, z), optional
-        For the same formats: the root, as for `glsk_o3d.editing.reroot`, from which the vertices are numbered. By
-        default vertex 0 if the numbers already go outwards from it, as from `pipelines.tree`; otherwise the root of
-        `glsk_o3d.analysis.branch_table`.
+        For the same formats: the root, as for `glsk_o3d.editing.reroot`. By default vertex 0 if the numbers go outwards
+        from it, as from `pipelines.tree`; otherwise that of `glsk_o3d.analysis.branch_table`.
     format : str, optional
         The ending of another format than that of `path`, with or without its dot.
 

@@ -56,16 +56,12 @@ def read_sample(
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
-    >>> from glsk_o3d import annotate, save_tensor_cloud, skeletonize
     >>> from glsk_o3d.samples import torus
-    >>> whole = skeletonize(torus(120000).points)
     >>> with TemporaryDirectory() as folder:
-    ...     save_tensor_cloud(annotate(whole), f"{folder}/scan.ply")
-    ...     sample = read_sample(f"{folder}/scan.ply")
+    ...     np.savetxt(f"{folder}/scan.xyz", torus(120000).points)
+    ...     sample = read_sample(f"{folder}/scan.xyz")
     >>> len(sample.point.positions) < 60000, int(sample.point.sample_count.numpy().sum())
     (True, 120000)
-    >>> bool(np.allclose(skeletonize(sample).vertices, whole.vertices))
-    True
     """
     if n is not None and (isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1):
         raise InvalidParameterError(f"n = {n!r}: must be an int of at least 1")
@@ -169,15 +165,12 @@ def annotate_file(
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
-    >>> from glsk_o3d import annotate, read_tensor_cloud, save_tensor_cloud, skeletonize
+    >>> from glsk_o3d import skeletonize
     >>> from glsk_o3d.samples import torus
-    >>> ring = skeletonize(torus(1000).points)
     >>> with TemporaryDirectory() as folder:
-    ...     save_tensor_cloud(annotate(skeletonize(torus(3000).points)), f"{folder}/scan.ply")
-    ...     annotate_file(ring, f"{folder}/scan.ply", f"{folder}/marked.ply")
-    ...     int(read_tensor_cloud(f"{folder}/marked.ply").point.skeleton_vertex.max().item()) < len(ring.vertices)
+    ...     np.savetxt(f"{folder}/scan.xyz", torus(3000).points)
+    ...     annotate_file(skeletonize(torus(1000).points), f"{folder}/scan.xyz", f"{folder}/marked.ply")
     3000
-    True
     """
     check_ending(output, "cloud with labels is PLY", WRITTEN_CLOUD_ENDING)
     if Path(output).exists() and Path(path).exists() and os.path.samefile(path, output):

@@ -5,8 +5,8 @@ import open3d as o3d
 import pytest
 
 from glsk_o3d import Skeleton, read_cloud, samples, to_tubes
-from glsk_o3d.errors import FileFormatError, InvalidParameterError
-from glsk_o3d.io.meshes import WRITTEN_MESH_ENDINGS, mesh_arrays, save_mesh
+from glsk_o3d.errors import FileFormatError
+from glsk_o3d.io.meshes import WRITTEN_MESH_ENDINGS, save_mesh
 from glsk_o3d.io.scans import read_mesh, read_scan
 
 # ------------------------------------------------------------------------------------------------------------- reading
@@ -121,21 +121,3 @@ def test_what_is_not_written(tmp_path, tubes):
     with pytest.raises(FileFormatError, match=r"m\.ply: the mesh is empty: there is nothing to write"):
         save_mesh(to_tubes(Skeleton((), (), (), (), (), ())), tmp_path / "m.ply")
     assert not list(tmp_path.iterdir())
-
-
-# -------------------------------------------------------------------------------------------------------------- arrays
-
-
-def test_every_kind_of_mesh_gives_the_same_arrays_and_what_is_useless_none():
-    octahedron = o3d.geometry.TriangleMesh.create_octahedron()
-    vertices, faces = np.asarray(octahedron.vertices), np.asarray(octahedron.triangles)
-    for mesh in (octahedron, o3d.t.geometry.TriangleMesh.from_legacy(octahedron), (vertices, faces)):
-        found = mesh_arrays(mesh)
-        assert [array.dtype for array in found] == [np.float64, np.int64]
-        np.testing.assert_array_equal(found[0], vertices)
-        np.testing.assert_array_equal(found[1], faces)
-        assert not np.shares_memory(found[0], vertices)
-    bare, lost = (np.eye(3), np.zeros((0, 3), int)), (np.eye(3) * np.nan, [[0, 1, 2]])
-    for wrong, says in ((7, "int"), (bare, r"\(F, 3\)"), ((np.eye(3), [[0, 1, 3]]), "vertex"), (lost, "not finite")):
-        with pytest.raises(InvalidParameterError, match=says):
-            mesh_arrays(wrong)

@@ -1,10 +1,10 @@
 """OBJ, GraphML, CGAL's polylines and VTP: vertices and edges, or branches, to the last bit; no cloud, no report.
 
-OBJ has edges as ``l`` lines, for MeshLab, Blender and CloudCompare, and no radii; scans are OBJ files, too, and a
-skeleton is one that has lines. GraphML has x, y, z and radius of the nodes and the length of every edge, for networkx,
-Gephi and Cytoscape. CGAL's text has a line per branch, the number of its points and then x y z of each; on reading,
-polylines are joined where their ends have equal coordinates. VTP, VTK's polydata, has the radii and confidences too,
-and the cell array ``branch`` counts the polylines. A vertex without edges is a polyline of one point, or a point.
+OBJ has edges as ``l`` lines, and no radii; scans are OBJ files, too, and a skeleton is one that has lines. GraphML has
+x, y, z and radius of the nodes and the length of every edge. CGAL's text has a line per branch, the number of its
+points and then x y z of each; on reading, polylines are joined where their ends have equal coordinates. VTP, VTK's
+polydata, has the radii and confidences too, and the cell array ``branch`` counts the polylines. A vertex without edges
+is a polyline of one point, or a point.
 """
 
 import base64

@@ -5,7 +5,6 @@ They are read by laspy with lazrs (extra ``las``) and by pye57 (extra ``e57``).
 
 import struct
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -87,8 +86,7 @@ def _blocks(path: Path, rows: int, bare: bool) -> Iterator[Scan]:
             yield scan_of(columns, top, unset=True)
 
 
-@contextmanager
-def _opened(path: Path, parts: str = "all") -> Iterator[Any]:
+def _opened(path: Path, parts: str = "all") -> Any:
     """laspy's reader of some parts of the points.
 
     In one thread: in many, lazrs takes all memory that a file asks for, and ends the process where there is none.
@@ -96,15 +94,7 @@ def _opened(path: Path, parts: str = "all") -> Iterator[Any]:
     laspy = require("laspy")
     selection = laspy.DecompressionSelection
     chosen = selection.all() if parts == "all" else getattr(selection.base(), parts)()
-    try:
-        with laspy.open(
-            path, laz_backend=laspy.LazBackend.Lazrs, decompression_selection=chosen, read_evlrs=False
-        ) as file:
-            yield file
-    except BaseException as error:  # what lazrs does not expect is none of Python's own exceptions
-        if type(error).__name__ != "PanicException":
-            raise
-        raise ValueError(f"lazrs cannot read it: {error}") from None
+    return laspy.open(path, laz_backend=laspy.LazBackend.Lazrs, decompression_selection=chosen, read_evlrs=False)
 
 
 def _brightest(path: Path, rows: int) -> float:

@@ -1,8 +1,7 @@
 """SWC and URDF: places, radii and edges of trees numbered from the root; no cloud.
 
-Tools for neurons and plants open SWC; many compute in float32. URDF is a robot model of capsules, for planning scenes,
-RViz and simulators; it is not read back. URDF knows no capsule: a link is a cylinder along an edge, and a ball at the
-vertex that it leads to. Lengths are taken as metres, as URDF has them.
+Tools for neurons and plants open SWC. URDF is a robot model, for planning scenes and simulators: a link is a cylinder
+along an edge, and a ball at the vertex that it leads to. Lengths are taken as metres, as URDF has them.
 """
 
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
