@@ -58,7 +58,23 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
     """
     points, vertex = vertex_of_cloud(skeleton, cloud)
     found = labels(skeleton, points, vertex, thickness_of_points(skeleton, points, vertex), color)
-    return _annotated(points if cloud is None else cloud, found)
+    cloud = points if cloud is None else cloud
+    o3d = import_open3d()
+    name, tensor = open3d_class(cloud)
+    if name in ("PointCloud", "TriangleMesh"):
+        kind = getattr(o3d.t.geometry, name)
+        geometry = cloud.clone() if tensor else kind.from_legacy(cloud, o3d.core.float64)
+    else:
+        array = cloud.cpu().numpy() if name == "Tensor" else np.asarray(cloud)
+        array = np.array(array, np.float32 if array.dtype == np.float32 else np.float64, order="C")
+        geometry = o3d.t.geometry.PointCloud(o3d.core.Tensor(array))
+    held = geometry.vertex if name == "TriangleMesh" else geometry.point
+    positions = held.positions
+    own = positions.dtype if positions.dtype in (o3d.core.float32, o3d.core.float64) else o3d.core.float64
+    for key, values in found.items():
+        values = np.ascontiguousarray(values).reshape(len(values), -1)
+        held[key] = o3d.core.Tensor(values, own if values.dtype.kind == "f" else None, positions.device)
+    return geometry
 
 
 def labels(
@@ -79,23 +95,3 @@ def labels(
         colors = thickness_shades(thickness) if thick else shades(skeleton, color, branch, vertex)
         found["colors"] = np.round(255 * colors).astype(np.uint8)
     return found
-
-
-def _annotated(cloud: Any, attributes: dict[str, np.ndarray]) -> Any:
-    """A tensor geometry with its own copy of all data, and attributes; floats become what its positions are."""
-    o3d = import_open3d()
-    name, tensor = open3d_class(cloud)
-    if name in ("PointCloud", "TriangleMesh"):
-        kind = getattr(o3d.t.geometry, name)
-        geometry = cloud.clone() if tensor else kind.from_legacy(cloud, o3d.core.float64)
-    else:
-        array = cloud.cpu().numpy() if name == "Tensor" else np.asarray(cloud)
-        array = np.array(array, np.float32 if array.dtype == np.float32 else np.float64, order="C")
-        geometry = o3d.t.geometry.PointCloud(o3d.core.Tensor(array))
-    held = geometry.vertex if name == "TriangleMesh" else geometry.point
-    positions = held.positions
-    own = positions.dtype if positions.dtype in (o3d.core.float32, o3d.core.float64) else o3d.core.float64
-    for key, values in attributes.items():
-        values = np.ascontiguousarray(values).reshape(len(values), -1)
-        held[key] = o3d.core.Tensor(values, own if values.dtype.kind == "f" else None, positions.device)
-    return geometry

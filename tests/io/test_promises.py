@@ -44,8 +44,7 @@ def test_one_rule():
     with pytest.raises(ValueError, match="it promises 6 rows and holds 5: it is truncated"):
         check_promised(6, 5, "rows")
     check_budget(ALWAYS_TAKEN, 1)
-    check_budget(3 * ALWAYS_TAKEN, ALWAYS_TAKEN, 3)
-    with pytest.raises(ValueError, match=r"at most 67108864 are allowed, 200 times as many"):
+    with pytest.raises(ValueError, match=r"at most 67108864 are allowed"):
         check_budget(ALWAYS_TAKEN + 1, 1)
 
 

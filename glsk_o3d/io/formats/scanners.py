@@ -87,10 +87,7 @@ def _blocks(path: Path, rows: int, bare: bool) -> Iterator[Scan]:
 
 
 def _opened(path: Path, parts: str = "all") -> Any:
-    """laspy's reader of some parts of the points.
-
-    In one thread: in many, lazrs takes all memory that a file asks for, and ends the process where there is none.
-    """
+    """laspy's reader of some parts of the points, in one thread: in many, lazrs takes what memory a file asks for."""
     laspy = require("laspy")
     selection = laspy.DecompressionSelection
     chosen = selection.all() if parts == "all" else getattr(selection.base(), parts)()

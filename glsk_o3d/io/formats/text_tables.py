@@ -69,7 +69,11 @@ def read(path: Path) -> Scan:
     ending = path.suffix.lower()
     if ending == ".pts":
         _check_count(path, len(rows))
-    names = layout.names or _names_by_ending(ending, layout.columns)
+    known = _BY_ENDING.get(ending, [*"xyz"])
+    if ending == ".pts" and len(layout.columns) == 6:
+        known = [*"xyz", *COLOR_CHANNELS]
+    others = (f"column_{column + 1}" for column in layout.columns[len(known) :])
+    names = layout.names or [*known, *others][: len(layout.columns)]
     columns: dict[str, np.ndarray] = {}
     for name, values in zip(names, rows.T, strict=True):
         role = _role(name)
@@ -146,14 +150,6 @@ def _rows(stream: TextIO, layout: Layout, path: Path) -> np.ndarray:
         with following_open3d():
             _log.warning("%s: %d of %d lines hold no point and were skipped", path, lost, lost + len(rows))
     return rows
-
-
-def _names_by_ending(ending: str, columns: list[int]) -> list[str]:
-    """What columns without names are."""
-    known = _BY_ENDING.get(ending, [*"xyz"])
-    if ending == ".pts" and len(columns) == 6:
-        known = [*"xyz", *COLOR_CHANNELS]
-    return [*known, *(f"column_{column + 1}" for column in columns[len(known) :])][: len(columns)]
 
 
 def _role(name: str) -> str:

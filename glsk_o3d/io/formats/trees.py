@@ -50,11 +50,9 @@ def write_urdf(skeleton: Skeleton) -> bytes:
     """The content of a URDF file of a forest that is numbered outwards; FileFormatError where it has no radii.
 
     Vertex i has ``link_i``, on the fixed joint ``joint_i``; the links of roots stand on the link ``base``, at the
-    origin of the cloud. A link's frame is where it can bend: at the vertex that it comes from, of a root at the vertex
-    itself. Frames are not turned, and each is placed relative to the one before, so that a large offset of the whole
-    cloud is in the joints of the roots alone. Both visual and collision are the ball of the vertex and the cylinder
-    that leads to it, as thick as its ends on average; what has no size is left out. Masses are those of solid cylinders
-    of `URDF_DENSITY`, of a root that of its ball.
+    origin of the cloud. A link's frame is at the vertex that it comes from, not turned, and relative to the one before:
+    a large offset of the whole cloud is in the joints of the roots alone. Cylinders are as thick as their ends on
+    average; what has no size is left out. Masses are those of solid cylinders of `URDF_DENSITY`, of a root of its ball.
     """
     vertices, radii = skeleton.vertices, skeleton.radii
     unknown = np.count_nonzero(~np.isfinite(radii))

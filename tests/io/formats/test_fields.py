@@ -104,7 +104,7 @@ def test_npz_never_unpickles_nor_fills_the_memory(tree, tmp_path):
     assert not (tmp_path / "went off").exists()
     np.savez_compressed(tmp_path / "s.npz", **{**held, "points": np.zeros((10**7, 3))})
     assert (tmp_path / "s.npz").stat().st_size < 10**6
-    with pytest.raises(FileFormatError, match=r"at most 67108864 are allowed, 200 times"):
+    with pytest.raises(FileFormatError, match=r"at most 67108864 are allowed"):
         read_skeleton(tmp_path / "s.npz")
 
 
