@@ -57,21 +57,6 @@ def test_tensor_clouds_keep_what_they_have_and_gain_ours(cloud, skeleton):
     assert not np.shares_memory(annotated["positions"], before["positions"])
 
 
-def test_through_selections_sampling_and_files(cloud, skeleton, tmp_path):
-    annotated = annotate(skeleton, cloud)
-    everything = held(annotated)
-    mask = everything["branch"][:, 0] == 1
-    assert_equal(held(annotated.select_by_mask(o3d.core.Tensor(mask))), {n: v[mask] for n, v in everything.items()})
-    thin = annotated.voxel_down_sample(0.08)
-    assert held(thin).keys() == everything.keys()
-    again = annotate(skeleton, thin)  # labels are labels again, not means of labels
-    np.testing.assert_array_equal(again.point.branch.numpy()[:, 0], segment(skeleton, thin))
-    for ending in ("ply", "pcd", "npz"):
-        path = str(tmp_path / f"cloud.{ending}")
-        assert o3d.t.io.write_point_cloud(path, annotated)
-        assert_equal(held(o3d.t.io.read_point_cloud(path)), everything)
-
-
 def test_legacy_clouds_arrays_and_meshes_become_tensor_ones(skeleton):
     vectors = o3d.utility.Vector3dVector
     legacy = o3d.geometry.PointCloud(vectors(POINTS))

@@ -40,12 +40,6 @@ def test_in_colour_without_edges(count, color):
     assert len(to_tubes(lone, color).vertex_colors) == len(to_tubes(lone, color).vertices)
 
 
-@pytest.mark.parametrize("color", ["branch", (1, 0), (0, 0, 2), (0, 0, np.nan), None])
-def test_a_line_set_of_one_colour_says_who_takes_words(skeleton, color):
-    with pytest.raises(InvalidParameterError, match=r"three numbers from 0 to 1; glsk_o3d\.to_line_set takes words"):
-        skeleton.to_line_set(color)
-
-
 def test_line_sets_in_colour():
     branched = skeletonize(samples.y_junction(800).points)
     for color, distinct in (("branch", 3), ((0.1, 0.2, 0.3), 1), ("radius", None), ("confidence", None)):

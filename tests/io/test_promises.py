@@ -1,9 +1,6 @@
 """Files that promise what they do not hold, unfold to more than memory, or name others: all are refused."""
 
 import os
-import re
-import subprocess
-import sys
 
 import numpy as np
 import open3d as o3d
@@ -15,28 +12,6 @@ from glsk_o3d.io.paths import ALWAYS_TAKEN, check_budget, check_promised
 from glsk_o3d.io.scans import read_mesh, read_scan
 
 POINTS = np.random.default_rng(0).normal(size=(400, 3)).round(3)
-REFUSAL = r"(promises|its \d+ bytes would take|may be cut|a line has 3000000 numbers)"
-LIMITED = """
-import resource, sys
-from glsk_o3d.errors import FileFormatError
-from glsk_o3d.io.scans import read_scan
-resource.setrlimit(resource.RLIMIT_DATA, (3 << 30,) * 2)
-try:
-    print(len(read_scan(sys.argv[1])))
-except FileFormatError as error:
-    print(error)
-"""
-
-
-def refused(path):
-    """In a process that may take 3 GB of memory and 60 seconds, and that nothing hangs or kills."""
-    done = subprocess.run(
-        [sys.executable, "-c", LIMITED, path], capture_output=True, text=True, timeout=60, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.count("\n") == 1
-    assert path.name in done.stdout
-    assert re.search(REFUSAL, done.stdout), done.stdout
 
 
 def test_one_rule():
@@ -46,31 +21,6 @@ def test_one_rule():
     check_budget(ALWAYS_TAKEN, 1)
     with pytest.raises(ValueError, match=r"at most 67108864 are allowed"):
         check_budget(ALWAYS_TAKEN + 1, 1)
-
-
-# -------------------------------------------------------------------------------------------------------------- points
-
-
-@pytest.fixture(scope="module")
-def lies(benchmark):
-    with benchmark("fuzz"):
-        import _fuzz_lies
-
-        yield _fuzz_lies
-
-
-@pytest.mark.parametrize("promised", ["401", "400000000"])
-def test_points_that_an_e57_file_does_not_hold(lies, tmp_path, promised):
-    pye57 = pytest.importorskip("pye57")
-    with pye57.E57(str(tmp_path / "s.e57"), mode="w") as file:
-        file.write_scan_raw(dict(zip(("cartesianX", "cartesianY", "cartesianZ"), POINTS.T.copy(), strict=True)))
-    data = (tmp_path / "s.e57").read_bytes()
-    content = b"".join(data[i : i + 1020] for i in range(0, len(data), 1024))
-    assert lies.e57(content) == data
-    (tmp_path / "s.e57").write_bytes(
-        lies.e57(content.replace(b'recordCount="400"', f'recordCount="{promised}"'.encode()))
-    )
-    refused(tmp_path / "s.e57")
 
 
 @pytest.mark.parametrize("name", ["c.ply", "c.pcd", "c.pts", "c.off"])
@@ -100,58 +50,42 @@ def test_a_vertex_too_many_does_not_take_the_bytes_of_a_face(tmp_path):
             read_mesh(tmp_path / "m.ply")
 
 
-# --------------------------------------------------------------------------------------------------------------- bombs
-
-
-def test_values_that_a_pcd_file_does_not_hold(tmp_path):
-    head = (
-        "VERSION .7\nFIELDS x y z a\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 200000000\nWIDTH 1\nHEIGHT 1\nPOINTS 1\n"
-    )
-    (tmp_path / "c.pcd").write_text(f"{head}DATA ascii\n1 2 3 4\n")
-    refused(tmp_path / "c.pcd")
-
-
-def test_faces_without_corners(lies, tmp_path):
-    (tmp_path / "c.ply").write_bytes(lies._ply_of(2 * 10**8, b"\0"))
-    refused(tmp_path / "c.ply")
-
-
-def test_copies_are_unpacked_in_time(lies, tmp_path):
-    (tmp_path / "c.pcd").write_bytes(lies._lzf(24 * 10**6))
-    assert len(read_scan(tmp_path / "c.pcd")) == 6 * 10**6 + 1
-
-
-@pytest.mark.parametrize("what", ["cloud .e57 constant", "cloud .xyz wide"])
-def test_what_no_scanner_writes(lies, tmp_path, what):
-    pytest.importorskip("pye57")
-    path = tmp_path / f"c{what.split()[1]}"
-    path.write_bytes(lies.BOMBS[what](10**6))
-    refused(path)
-
-
-# --------------------------------------------------------------------------------------------------------------- named
+@pytest.mark.parametrize(
+    ("name", "data", "says"),
+    [
+        (
+            "c.pcd",
+            b"FIELDS x y z a\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 200000000\nPOINTS 1\nDATA ascii\n1 2 3 4\n",
+            "promises 1 points and holds 0",
+        ),
+        (
+            "c.ply",
+            b"ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+            b"element face 9999\nproperty list uchar int vertex_indices\nend_header\n" + bytes(10011),
+            "promises 9999 rows of 'face'",
+        ),
+        ("c.xyz", b"1 " * 3000 + b"\n", "a line has 3000 numbers"),
+        ("c.e57", b"ASTM-E57" + bytes(32) + (1024).to_bytes(8, "little") + bytes(3000), "not a valid"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_what_no_scanner_writes(tmp_path, name, data, says):
+    if name == "c.e57":
+        pytest.importorskip("pye57")
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(FileFormatError, match=says) as caught:
+        read_scan(tmp_path / name)
+    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
-@pytest.mark.parametrize("name", ["cloud .obj mtllib", "cloud .obj goes on", "cloud .obj map"])
-@pytest.mark.parametrize("other", ["pipe", "/dev/zero", "none"])
-def test_looks_are_not_read(lies, tmp_path, name, other):
+@pytest.mark.parametrize("keyword", ["mtllib", "mt\\\nllib"])
+@pytest.mark.parametrize("other", ["pipe", "/dev/zero", "none", "given.mtl"])
+def test_looks_are_not_read(tmp_path, keyword, other):
     os.mkfifo(tmp_path / "pipe")
-    (tmp_path / "given.mtl").write_text(f"newmtl a\nmap_Kd {other}\n")
-    path = tmp_path / f"m{name.split()[1]}"
-    path.write_bytes(lies.NAMING[name](other))
-    assert len(read_scan(path)) == 3
-
-
-# -------------------------------------------------------------------------------------------------------------- errors
-
-
-def test_errors_of_others_in_one_line(tmp_path):
-    pytest.importorskip("pye57")
-    (tmp_path / "s.e57").write_bytes(b"ASTM-E57" + bytes(32) + (1024).to_bytes(8, "little") + bytes(3000))
-    with pytest.raises(FileFormatError) as caught:
-        read_scan(tmp_path / "s.e57")
-    assert "\n" not in str(caught.value)
+    (tmp_path / "given.mtl").write_text("newmtl a\nmap_Kd pipe\n")
+    (tmp_path / "m.obj").write_text(f"{keyword} {other}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n")
+    assert len(read_scan(tmp_path / "m.obj")) == 3
 
 
 def test_errors_of_the_system_name_the_file(tmp_path, monkeypatch):

@@ -111,6 +111,37 @@ def test_damaged_and_empty_files(las, e57, name):
 # ---------------------------------------------------------------------------------------------------------------- sound
 
 
+def overwrite(path, at, number, length=4):
+    data = bytearray(path.read_bytes())
+    data[at : at + length] = number.to_bytes(length, "little")
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize(
+    ("place", "number", "length"),
+    [
+        ("records", 2**31, 4),
+        *(("chunks", count, 4) for count in (0, 1000, 2**31)),
+        ("table", 2**40, 8),
+        ("layer", 2**31, 4),
+    ],
+)
+def test_what_no_packed_file_holds_is_refused(las, place, number, length):
+    """For some of it lazrs would end the process, for some laspy would not come back."""
+    path = las("c.laz")
+    start = int.from_bytes(path.read_bytes()[96:100], "little")
+    table = int.from_bytes(path.read_bytes()[start : start + 8], "little")
+    size = path.stat().st_size
+    path.write_bytes(
+        path.read_bytes() + table.to_bytes(8, "little")
+    )  # a table that was written last is found at the end
+    overwrite(path, start, 2**64 - 1, 8)
+    assert len(read_scan(path)) == 3
+    overwrite(path, {"records": 100, "chunks": table + 4, "table": size, "layer": start + 52}[place], number, length)
+    with pytest.raises(FileFormatError, match="promise"):
+        read_scan(path)
+
+
 @pytest.mark.parametrize("point_format", [0, 6])
 def test_a_flat_grid_is_packed_well_and_read(tmp_path, point_format):
     grid = np.indices((600, 600, 1)).reshape(3, -1).T * 1.0
