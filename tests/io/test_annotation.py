@@ -101,7 +101,5 @@ def test_colours(cloud, skeleton):
     marked = annotate(skeleton, cloud, color="thickness").point
     expected = np.round(255 * thickness_shades(marked.thickness.numpy()[:, 0].astype(float)))
     assert np.abs(marked.colors.numpy() - expected).max() <= 1
-    legacy = annotate(skeleton, cloud, color="branch").to_legacy()
-    np.testing.assert_allclose(np.asarray(legacy.colors), shown / 255, atol=1e-6)
     with pytest.raises(InvalidParameterError, match="color"):
         annotate(skeleton, cloud, color="size")

@@ -37,7 +37,8 @@ def test_meshes_give_their_vertices(tmp_path, caplog, ending, resolution, coarse
 @pytest.mark.parametrize("ending", ["gltf", "glb", "stl", "off"])
 def test_files_that_break_off(tmp_path, capfd, ending):
     mesh, path = o3d.geometry.TriangleMesh.create_sphere(1.0, 6), tmp_path / f"m.{ending}"
-    mesh.compute_triangle_normals()
+    if ending == "stl":
+        mesh.compute_triangle_normals()
     if ending == "glb":
         o3d.t.io.write_triangle_mesh(str(path), o3d.t.geometry.TriangleMesh.from_legacy(mesh))
     else:

@@ -60,7 +60,8 @@ def test_a_vertex_too_many_does_not_take_the_bytes_of_a_face(tmp_path):
         ),
         (
             "c.ply",
-            b"ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+            b"ply\nformat binary_little_endian 1.0\nelement vertex 1\n"
+            b"property float x\nproperty float y\nproperty float z\n"
             b"element face 9999\nproperty list uchar int vertex_indices\nend_header\n" + bytes(10011),
             "promises 9999 rows of 'face'",
         ),

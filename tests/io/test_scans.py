@@ -13,11 +13,9 @@ from glsk_o3d.io.paths import CLOUD_ENDINGS, MESH_ENDINGS
 from glsk_o3d.io.scans import promised_points, read_blocks, read_cloud, read_scan, read_tensor_cloud, save_tensor_cloud
 from glsk_o3d.io.skeletons import READABLE, read_skeleton, read_truth
 
-OPTIONS = pytest.mark.parametrize("options", [{}, {"write_ascii": True}, {"compressed": True}], ids=str)
-
 
 @pytest.mark.parametrize("name", ["c.ply", "c.pcd", "c.xyz", "c.xyzn", "c.xyzrgb", "c.pts", "c é.Pcd"])
-@OPTIONS
+@pytest.mark.parametrize("options", [{}, {"write_ascii": True}, {"compressed": True}], ids=str)
 def test_clouds_that_open3d_writes(cloud, xyz, tmp_path, name, options):
     kind = name.lower().split(".")[1]
     assert o3d.io.write_point_cloud(str(tmp_path / f"plain.{kind}"), cloud, **options)
@@ -118,12 +116,10 @@ PLY = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float
     ("name", "text", "says"),
     [
         ("c.ply", PLY + "end_header\n1 2 3\n4 five 6\n", "five"),
-        ("c.ply", PLY.replace("x 2", "x 99999999999") + "end_header\n1 2 3\n", "promises 99999999999 points and"),
         ("c.ply", PLY.replace("vertex 2", "vertex 0") + "end_header\n", "no points"),
         ("c.ply", PLY.replace("vertex 2", "face 2") + "end_header\n1 2 3\n4 5 6\n", "vertex"),
         ("c.pts", "1 2 3\n4 5 6\n", "number of points"),
         ("c.pts", "2\n1 2 3\n4 x 6\n", "promises 2 points and holds 1"),
-        ("c.pts", "99999999999999\n1 2 3\n", "holds 1"),
     ],
 )
 def test_damaged_clouds(tmp_path, name, text, says):
@@ -198,7 +194,6 @@ FILES = {
     "PCD text": open3d("c.pcd", write_ascii=True),
     "LAS 1.2": las("c.las", 3, "1.2"),
     "LAS": las("c.las", 7),
-    "LAS, colours of 8 bits": las("c.las", 7, top=255),
     "LAS, colours unset": las("c.las", 7, top=0),
     "LAZ": las("c.laz", 6),
     "LAZ, colours of 8 bits": las("c.LAZ", 7, top=200),

@@ -129,11 +129,6 @@ def test_endings(tree, tmp_path, assert_identical):
         assert_identical(read_skeleton(tmp_path / "s.bak", format=format), tree)
 
 
-def test_a_missing_folder_is_named(tree, tmp_path):
-    with pytest.raises(FileNotFoundError, match=r"missing.*folder.*s\.ply"):
-        save_skeleton(tree, tmp_path / "missing" / "s.ply")
-
-
 @pytest.mark.parametrize("ending", [".ply", ".obj"])
 @pytest.mark.parametrize("mesh", [False, True])
 def test_a_scan_is_no_skeleton(cloud, tmp_path, ending, mesh):

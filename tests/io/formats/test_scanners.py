@@ -119,12 +119,7 @@ def overwrite(path, at, number, length=4):
 
 @pytest.mark.parametrize(
     ("place", "number", "length"),
-    [
-        ("records", 2**31, 4),
-        *(("chunks", count, 4) for count in (0, 1000, 2**31)),
-        ("table", 2**40, 8),
-        ("layer", 2**31, 4),
-    ],
+    [("records", 2**31, 4), ("chunks", 0, 4), ("chunks", 2**31, 4), ("table", 2**40, 8), ("layer", 2**31, 4)],
 )
 def test_what_no_packed_file_holds_is_refused(las, place, number, length):
     """For some of it lazrs would end the process, for some laspy would not come back."""
@@ -132,9 +127,7 @@ def test_what_no_packed_file_holds_is_refused(las, place, number, length):
     start = int.from_bytes(path.read_bytes()[96:100], "little")
     table = int.from_bytes(path.read_bytes()[start : start + 8], "little")
     size = path.stat().st_size
-    path.write_bytes(
-        path.read_bytes() + table.to_bytes(8, "little")
-    )  # a table that was written last is found at the end
+    path.write_bytes(path.read_bytes() + table.to_bytes(8, "little"))  # where one that was written last is
     overwrite(path, start, 2**64 - 1, 8)
     assert len(read_scan(path)) == 3
     overwrite(path, {"records": 100, "chunks": table + 4, "table": size, "layer": start + 52}[place], number, length)
