@@ -76,7 +76,7 @@ def read(path: Path) -> Scan:
     names = layout.names or [*known, *others][: len(layout.columns)]
     columns: dict[str, np.ndarray] = {}
     for name, values in zip(names, rows.T, strict=True):
-        role = _role(name)
+        role = name if _role(name) in columns else _role(name)
         while role in columns:
             role += "_2"
         columns[role] = values if role in _ROLES.values() else _whole(values)

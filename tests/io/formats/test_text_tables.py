@@ -82,12 +82,13 @@ def test_a_last_line_that_breaks_off_is_no_point(tmp_path, caplog):
 
 
 def test_attributes_become_those_of_a_tensor_cloud(tmp_path):
-    (tmp_path / "c.csv").write_text("x,y,z,Tree ID,x,7,class\n1,2,3,4,5.5,6,oak\n4,5,6,7,8.5,9,ash\n")
+    (tmp_path / "c.csv").write_text("x,y,z,Tree ID,x,7,class,height\n1,2,3,4,5.5,6,oak,0\n4,5,6,7,8.5,9,ash,1\n")
     point = read_tensor_cloud(tmp_path / "c.csv").point
     assert {key: point[key].numpy().ravel().tolist() for key in point if key != "positions"} == {
         "Tree_ID": [4, 7],
         "x_2": [5.5, 8.5],
         "column_7": [6, 9],
+        "height": [0, 1],
     }
     assert str(point.Tree_ID.dtype) == "Int32"
 
