@@ -39,7 +39,6 @@ def test_named_columns(tmp_path, program):
     [
         ("c.xyz", "1 2 3", None, None, {}),
         ("c.xyz", "1, 2, 3", None, None, {}),
-        ("c.xyz", "1 2 3 7.5", None, None, {"column_4": 7.5}),
         ("c.xyzn", "1 2 3 0 3 4", None, [0, 3, 4], {}),
         ("c.xyzrgb", "1 2 3 0.25 1 0", [0.25, 1, 0], None, {}),
         ("c.pts", "1 2 3 -905 255 51 0", [1, 0.2, 0], None, {"intensity": -905}),
@@ -115,7 +114,6 @@ def test_text_that_is_no_cloud(tmp_path, text, why):
     [
         "# exported by CloudCompare\n",
         "my first scan\n",
-        "# X Y Z\n",
         "X,Y,Z\n[m],[m],[m]\n",
         "// 1 of 3\n",
         "Höhe über Null\n",
