@@ -36,7 +36,8 @@ def lie_case(rng: np.random.Generator, folder: Path) -> tuple[str, str, list[str
     A finding is also a point that the file does not hold.
     """
     n = int(rng.choice(SIZES))
-    names = [name for name in seeds(n) if name.split()[1] not in (".csv", ".txt", ".xyz", ".obj")]  # which have none
+    none = (".csv", ".txt", ".xyz", ".obj", ".gltf", ".glb")  # which have none, or are read by Open3D
+    names = [name for name in seeds(n) if name.split()[1] not in none]
     name = names[rng.integers(len(names))]
     data, places = seeds(n)[name]
     kind, ending = name.split()[:2]

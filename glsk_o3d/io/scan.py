@@ -159,9 +159,6 @@ def _value(node: ast.AST, columns: Mapping[str, np.ndarray]) -> Any:
     raise InvalidParameterError(f"{ast.unparse(node)!r} is not understood: compare attributes with numbers")
 
 
-# ------------------------------------------------------------------------------------------------- what readers need
-
-
 def scan_of(columns: Mapping[str, np.ndarray], top: float | None = None, unset: bool = False) -> Scan:
     """Points of columns, (N,) arrays by name: places, colours and normals by their names, all else are attributes, by
     names that can stand in an expression, such as ``class_``, ``Scalar_field`` and ``column_7``.

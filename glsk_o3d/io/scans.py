@@ -81,8 +81,8 @@ def read_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
     >>> with TemporaryDirectory() as folder:
     ...     path = Path(folder, "scan.csv")
     ...     _ = path.write_text("x,y,z,label\\n0,0,0,1\\n0,0,1,2\\n0,1,1,2\\n")
-    ...     len(read_cloud(path, where="label == 2").points), read_tensor_cloud(path).point.label.shape
-    (2, SizeVector[3, 1])
+    ...     len(read_cloud(path, where="label == 2").points)
+    2
     """
     return read_scan(path, where).to_legacy()
 
@@ -100,6 +100,14 @@ def read_tensor_cloud(path: str | os.PathLike, *, where: str | None = None) -> A
     open3d.t.geometry.PointCloud
         Positions are float64. Attributes have the names of the file, with an underscore for characters that expressions
         do not allow.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     _ = Path(folder, "scan.csv").write_text("x,y,z,label\\n0,0,0,1\\n0,0,1,2\\n")
+    ...     read_tensor_cloud(f"{folder}/scan.csv").point.label.flatten().numpy()
+    array([1, 2], dtype=int32)
     """
     return read_scan(path, where).to_tensor()
 
@@ -146,9 +154,6 @@ def read_mesh(path: str | os.PathLike) -> Any:
         if values is not None:
             setattr(mesh, name, vectors(values))
     return mesh
-
-
-# -------------------------------------------------------------------------------------------------------------- blocks
 
 
 def read_blocks(
@@ -224,9 +229,6 @@ def _chosen(path: Path, blocks: Iterator[Scan], where: str | None) -> Iterator[S
         raise InvalidCloudError(f"there is no point with {where}")
 
 
-# ------------------------------------------------------------------------------------------------------------- writing
-
-
 def save_tensor_cloud(cloud: Any, path: str | os.PathLike) -> None:
     """Write a tensor cloud with all its attributes and all digits, as PLY, which Open3D and `read_tensor_cloud` read.
 
@@ -244,6 +246,13 @@ def save_tensor_cloud(cloud: Any, path: str | os.PathLike) -> None:
         The ending is another.
     OSError
         The folder does not exist, or the file cannot be written.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> cloud = import_open3d().t.geometry.PointCloud(np.eye(3))
+    >>> with TemporaryDirectory() as folder:
+    ...     save_tensor_cloud(cloud, f"{folder}/cloud.ply")
     """
     check_ending(path, "cloud with labels is PLY", WRITTEN_CLOUD_ENDING)
     data = ply.content(ply.columns_of({name: cloud.point[name].cpu().numpy() for name in cloud.point}))

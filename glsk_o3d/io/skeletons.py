@@ -134,6 +134,14 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
         A folder, a cloud, an unknown ending, or a file that is damaged or from a newer release.
     MissingPackageError
         Of GraphML, without the extra [graph].
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     _ = Path(folder, "s.obj").write_text("v 0 0 0\\nv 1 0 0\\nl 1 2\\n")
+    ...     read_skeleton(f"{folder}/s.obj").length
+    1.0
     """
     path = existing_file(path)
     if format is None and path.suffix.lower() in {*SCAN_ENDINGS} - FORMATS.keys():
@@ -157,10 +165,7 @@ def _is_cloud(path: Path) -> FileFormatError:
 
 
 def holds_skeleton(path: str | os.PathLike) -> bool:
-    """Whether a file holds a skeleton: PLY with edges or OBJ with lines, but no faces, or by the ending.
-
-    False also for what does not exist: reading it as a cloud says so.
-    """
+    """Whether a file is there and holds a skeleton: PLY with edges or OBJ with lines, but no faces, or by the ending."""
     path = Path(path)
     ending = path.suffix.lower()
     if not path.is_file():
@@ -199,6 +204,14 @@ def read_truth(path: str | os.PathLike) -> Truth:
     FileNotFoundError
     FileFormatError
         It is neither, or it holds no axis.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     _ = Path(folder, "s.swc").write_text("1 0 0 0 0 0.1 -1\\n2 0 0 0 1 0.1 1\\n")
+    ...     len(read_truth(f"{folder}/s.swc").edges)
+    1
     """
     path, names = existing_file(path), ("nodes", "edges", "radii")
     try:

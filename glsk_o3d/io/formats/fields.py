@@ -15,7 +15,7 @@ import numpy as np
 
 from ...report import Report
 from ...skeleton import ARRAYS, Skeleton
-from ..paths import check_budget
+from ..paths import check_budget, check_promised
 
 FORMAT, FORMAT_VERSION = "glsk-o3d skeleton", 1
 
@@ -47,9 +47,16 @@ def read_npz(data: bytes) -> Skeleton:
 
 def npz_arrays(data: bytes, names: Iterable[str]) -> dict[str, Any]:
     """Those arrays of an npz archive that it has; ValueError where they are pickled, or unpack to more than memory."""
+    arrays: dict[str, Any] = {}
     with np.load(io.BytesIO(data), allow_pickle=False) as archive:
         check_budget(sum(info.file_size for info in archive.zip.infolist()), len(data))
-        return {name: archive[name] for name in names if name in archive}
+        for name in {*names} & {*archive}:
+            with archive.zip.open(f"{name}.npy") as held:
+                np.lib.format.read_magic(held)
+                shape, _, kind = np.lib.format.read_array_header_1_0(held)
+                check_promised(math.prod(shape) * kind.itemsize, archive.zip.getinfo(f"{name}.npy").file_size, name)
+            arrays[name] = archive[name]
+    return arrays
 
 
 def dumps(value: Any) -> str:

@@ -38,9 +38,6 @@ WRITTEN_KINDS = {"u1": "uchar", "i4": "int", "f4": "float", "f8": "double"}
 _PROPERTIES = {"positions": [*"xyz"], "normals": NORMAL_NAMES, "colors": COLOR_CHANNELS}
 
 
-# -------------------------------------------------------------------------------------------------------------- header
-
-
 class Column(NamedTuple):
     """A property of an element: its name, NumPy's type without byte order, and that of the counts if it is a list."""
 
@@ -123,9 +120,6 @@ def holds_lines(stream: BinaryIO) -> bool:
         rows = {element.name: element.rows for element in read_header(stream)[1]}
         return "edge" in rows and not rows.get("face")
     return False
-
-
-# -------------------------------------------------------------------------------------------------------------- tables
 
 
 class Lists(NamedTuple):

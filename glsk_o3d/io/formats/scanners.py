@@ -23,9 +23,6 @@ _E57_INVALID = "cartesianInvalidState"
 _E57_BYTES = 32  # derived: of a point with all that is read of it
 
 
-# ------------------------------------------------------------------------------------------------------------------ LAS
-
-
 def blocks(path: Path, rows: int, bare: bool) -> tuple[int, Iterator[Scan]]:
     """What is 0 in all of a block is unset in it."""
     require_for(path.suffix)
@@ -62,7 +59,7 @@ def _check_chunks(stream: BinaryIO, header: Any, size: int) -> None:
         table = number(size - 8, 8)
     chunks = number(min(table, size) + 4, 4)
     # each has a whole point; of those that the table does not have lazrs would believe all
-    sound = point == header.point_format.size and place <= table < size
+    sound = 0 < point == header.point_format.size and place <= table < size
     sound = sound and -(-header.point_count // (chunk or 1)) <= chunks <= size / max(point, 1)
     for _ in range(chunks if sound and layers else 0):
         lengths = [number(place + point + 4 * layer, 4) for layer in range(1, 1 + layers)]
@@ -104,9 +101,6 @@ def _brightest(path: Path, rows: int) -> float:
                 if top > 255:
                     break
     return top
-
-
-# ------------------------------------------------------------------------------------------------------------------ E57
 
 
 def read_e57(path: Path) -> Scan:

@@ -16,9 +16,6 @@ from .graphs import graph_skeleton, line, parents, text, words_by_line
 URDF_DENSITY = 1000.0  # published: of water, in kg/m³; fresh wood and most plants are near it
 
 
-# ------------------------------------------------------------------------------------------------------------------ SWC
-
-
 def write_swc(forest: Skeleton) -> bytes:
     """The content of an SWC file of a skeleton that is numbered from its roots outwards."""
     parent = parents(forest)
@@ -41,9 +38,6 @@ def read_swc(data: bytes) -> Skeleton:
     if (names[order][place] != parent[child]).any() or len(np.unique(names)) < len(names):
         raise ValueError("a parent is missing, or two rows have the same id")
     return graph_skeleton(table[:, 2:5], np.column_stack([child, order[place]]), table[:, 5])
-
-
-# ----------------------------------------------------------------------------------------------------------------- URDF
 
 
 def write_urdf(skeleton: Skeleton) -> bytes:
