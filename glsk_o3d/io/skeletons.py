@@ -165,7 +165,7 @@ def _is_cloud(path: Path) -> FileFormatError:
 
 
 def holds_skeleton(path: str | os.PathLike) -> bool:
-    """Whether a file is there and holds a skeleton: PLY with edges or OBJ with lines, but no faces, or by the ending."""
+    """Whether a file is there and a skeleton: PLY with edges or OBJ with lines, but no faces, or by the ending."""
     path = Path(path)
     ending = path.suffix.lower()
     if not path.is_file():

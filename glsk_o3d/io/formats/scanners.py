@@ -50,7 +50,8 @@ def _check_chunks(stream: BinaryIO, header: Any, size: int) -> None:
         return int.from_bytes(stream.read(length), "little")
 
     record = header.vlrs.get("LasZipVlr")[0].record_data
-    items, chunk = np.frombuffer(record[34:], "<u2").reshape(-1, 3), int.from_bytes(record[12:16], "little")
+    chunk, n_items = struct.unpack_from("<12xI16xH", record)
+    items = np.frombuffer(record, "<u2", 3 * n_items, 34).reshape(-1, 3)
     point = int(items[:, 1].sum())
     layers = sum(LAYERS.get(kind, width) for kind, width, _ in items.tolist()) if record[0] == LAYERED else 0
     place = header.offset_to_point_data + 8
