@@ -108,7 +108,7 @@ def kill_one(scans: Path, out: Path, folder: Path, after: int, *words: str) -> d
         line = command(scans, out, *words, "--scheduler", file)
         run = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         path = out / "ledger.jsonl"
-        while not path.exists() or path.read_bytes().count(b"\n") < after:
+        while not path.exists() or path.read_bytes().count(b'"done"') < after:
             time.sleep(0.02)
         workers[0].send_signal(signal.SIGKILL)
         run.wait()

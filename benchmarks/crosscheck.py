@@ -20,11 +20,11 @@ from _tables import number, present, save
 
 from glsk_o3d import RingBuilder, read_cloud, samples
 from glsk_o3d.analysis import compare
-from glsk_o3d.crosscheck import cross_check, save_crosscheck_picture
+from glsk_o3d.crosscheck import cross_check
 from glsk_o3d.crosscheck.agreement import VERDICTS
 from glsk_o3d.crosscheck.mesh import ball_pivoting, curvature_normals, mesh_areas, mesh_laplacian, ring_areas
+from glsk_o3d.crosscheck.mesh_rings import umbrellas
 from glsk_o3d.numerics.cotangent import cotangent_laplacian
-from glsk_o3d.numerics.mesh_rings import umbrellas
 
 EVERY = "clean_1024,clean_4096,density_4096,holes_4096,scan2_4096,noise1_4096,noise2_4096,outliers_4096"
 GOOD = dict(error=0.4, inside=0.9, completeness=0.9)  # and the right topology: a skeleton that deserves trust
@@ -32,14 +32,12 @@ GOOD = dict(error=0.4, inside=0.9, completeness=0.9)  # and the right topology: 
 app = application(__doc__)
 
 
-def checked(cloud: Case | Path, picture: Path | None = None) -> dict:
+def checked(cloud: Case | Path) -> dict:
     """The check of a cloud in numbers, and whether its skeleton is good if the axis is known."""
     points, axis = (read_cloud(cloud), None) if isinstance(cloud, Path) else cloud.load()
     start = time.process_time()
     check = cross_check(points)
     seconds = time.process_time() - start
-    if picture is not None:
-        save_crosscheck_picture(check, picture, title=picture.stem)
     told = check.to_dict() | dict(cpu=seconds)
     if axis is not None:
         true = compare(check.skeleton, axis)
@@ -138,18 +136,12 @@ def curvature(
 @app.command()
 def scans(
     files: Annotated[list[Path], typer.Argument(metavar="SCAN...", exists=True)],
-    pictures: Annotated[
-        Path | None, typer.Option(metavar="DIR", exists=True, file_okay=False, help="Draw each into this folder.")
-    ] = None,
     jobs: Jobs = 2,
     output: Output = None,
     markdown: Markdown = False,
 ) -> None:
     """What the check says of some scans."""
-    work = [
-        (dict(cloud=path.stem), (path, None if pictures is None else pictures / f"{path.stem}.png")) for path in files
-    ]
-    rows = run(checked, work, jobs)
+    rows = run(checked, [(dict(cloud=path.stem), (path,)) for path in files], jobs)
     save(output, rows)
     header = ["cloud", "points", "CPU s", "covered", "same rings", "angle", "90 %", "apart", "95 %"]
     header += ["components", "loops", "note"]

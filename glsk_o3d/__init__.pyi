@@ -38,7 +38,7 @@ from .meshlab.meshset import MeshSet
 from .outlier_remover import OutlierRemover
 from .pipeline import Filter, Pipeline
 from .points import Points
-from .recipes import from_recipe, load_recipe, rerun, save_recipe, to_recipe
+from .recipes import from_recipe, load_recipe, save_recipe, to_recipe
 from .refiner import Refiner
 from .report import IterationRecord, Report
 from .resampling import support
@@ -51,7 +51,7 @@ from .thinner import Thinner
 from .tracer import Tracer
 from .viewing.page import ContractionRecorder, save_report
 from .viewing.plot import plot_skeleton
-from .viewing.preview import save_assessment, save_preview
+from .viewing.preview import save_preview
 
 __version__: str
 
@@ -107,8 +107,6 @@ __all__ = [
     "read_tensor_cloud",
     "read_truth",
     "remove_redundant_points",
-    "rerun",
-    "save_assessment",
     "save_mesh",
     "save_preview",
     "save_recipe",

@@ -94,7 +94,7 @@ class Connector(Filter[Skeleton]):
         link = a != b
         if self.links == "all":
             link &= ~across_gaps(state)
-        if self.links == "nearest":
+        else:
             length = np.where(link, rings.edge_lengths(state.positions), np.inf)
             link &= length == np.repeat(np.minimum.reduceat(length, rings.indptr[:-1]), rings.sizes)
         a, b = a[link], b[link]

@@ -10,18 +10,20 @@ from scipy.sparse import csr_matrix
 
 from .numerics.cotangent import cotangent_laplacian
 from .numerics.eigen import largest_eigenvalue
+from .numerics.neighbourhoods import wide_covariances
 from .numerics.rings import Rings
 from .numerics.solver import SolveError, solve_contraction
-from .numerics.vectors import PAIRS, TINY
+from .numerics.vectors import TINY
 from .parameters import documented, parameter
-from .pipeline import Filter, Watch
-from .report import REFUSED, STOPPED_BY_CALLER, IterationRecord, Report
+from .pipeline import Filter, Watch, with_filters
+from .report import REFUSED, STOPPED_BY_CALLER, IterationRecord
 from .state import Contraction
 from .stopping import ExplainedScore, StopRule
 
 LINE_VARIANCE = 0.99  # fitted: explained variance that counts as a line
 OWN_WEIGHT = 4  # fitted: neighbours that a point counts as in its own surroundings
 
+Reducer: TypeAlias = Callable[[Contraction], Contraction]
 Laplacian: TypeAlias = Callable[[Contraction], csr_matrix]
 
 
@@ -60,7 +62,7 @@ class Contractor(Filter[Contraction]):
 
     consumes: ClassVar[type] = Contraction
 
-    reducer: Callable[[Contraction], Contraction] | None = parameter(
+    reducer: Reducer | None = parameter(
         None, "Merges redundant points after each solve; None keeps them all.", type="reducer?"
     )
     stop: StopRule = parameter(ExplainedScore(), "Decides after each solve whether to stop.", type="stop")
@@ -105,8 +107,7 @@ class Contractor(Filter[Contraction]):
         """
         reducer = self.reducer
         for _ in range(self.max_iterations):
-            start = time.perf_counter()
-            before = state
+            start, before = time.perf_counter(), state
             try:
                 state, facts = self._solve(state, laplacian)
             except SolveError as problem:
@@ -114,11 +115,9 @@ class Contractor(Filter[Contraction]):
             state = _record(state, **facts, seconds=time.perf_counter() - start)
             reason = self.stop(state.report.iterations)
             if reason is None and reducer is not None:
-                n = len(state)
-                state = _within(reducer(state), state.report)
+                n, state = len(state), _reduced(state, reducer, start)
                 if len(state) == n:
                     reducer = None  # as in the published code, which gives up after a pass without a merge
-                state = _amend(state, n_merged=n - len(state), seconds=time.perf_counter() - start)
             if watch is not None and watch(state) is False and reason is None:
                 return _finished(state, STOPPED_BY_CALLER)
             if reason is not None:
@@ -135,10 +134,8 @@ class Contractor(Filter[Contraction]):
         with np.errstate(divide="ignore"):
             attraction = state.ring_size0 / state.ring_size  # Wen (5)
         if self.line_hold > 1 and state.report.iterations:
-            attraction = (
-                np.where(explained_variance(state.positions, state.rings) > LINE_VARIANCE, self.line_hold, 1)
-                * attraction
-            )
+            line = explained_variance(state.positions, state.rings) > LINE_VARIANCE
+            attraction = np.where(line, self.line_hold, 1) * attraction
         attraction = np.clip(attraction, self.min_attraction, self.max_attraction)
         laplacian = laplacian_of(state)
         mass = np.sqrt(state.mass)
@@ -183,12 +180,8 @@ def explained_variance(points: np.ndarray, rings: Rings) -> np.ndarray:
     The moments of a point are averaged with those of its ring, twice, and count as much as four neighbours. Rings cost
     a third of what asking for the nearest points costs, and are as good.
     """
-    moments = np.stack([*points.T, *(points[:, i] * points[:, j] for i, j in PAIRS)], axis=1)
     own = (OWN_WEIGHT / (OWN_WEIGHT + rings.sizes))[:, None]
-    for _ in range(2):
-        moments = own * moments + (1 - own) * rings.mean_over(moments)
-    mean, square = moments[:, :3].T, moments[:, 3:].T
-    spread = square - [mean[i] * mean[j] for i, j in PAIRS]
+    spread, square = wide_covariances(points, lambda values: own * values + (1 - own) * rings.mean_over(values), 2)
     total = spread[0] + spread[3] + spread[5]
     rounding = 1e-12 * (square[0] + square[3] + square[5])  # of the differences: what is less has no direction
     return np.where(total > rounding, largest_eigenvalue(spread) / np.maximum(total, TINY), 0)
@@ -201,22 +194,13 @@ def explained_score(points: np.ndarray) -> float:
     return float((spread.sum() + spread[-1]) / (2 * spread.sum()))  # Wen (14)
 
 
-def _within(state: Contraction, report: Report) -> Contraction:
-    """The state of a reducer that ran inside the contractor: no stage of its own in the report."""
-    kept = replace(state.report, stages=report.stages, recipe=report.recipe, seconds=report.seconds)
-    return replace(state, report=kept)
-
-
 def _record(state: Contraction, **facts: Any) -> Contraction:
-    iterations = state.report.iterations
-    explained = explained_score(state.positions)
-    if iterations:
-        before, n_before = iterations[-1].explained, iterations[-1].n_points
-    else:
-        before, n_before = explained_score(state.cloud), len(state)
+    """A state with the record of its last solve in the report."""
+    done, explained = state.report.iterations, explained_score(state.positions)
+    before, n_before = (done[-1].explained, done[-1].n_points) if done else (explained_score(state.cloud), len(state))
     kept = 1 - (n_before - len(state)) / state.report.n_contracted  # Wen (15)
     record = IterationRecord(
-        iteration=len(iterations) + 1,
+        iteration=len(done) + 1,
         n_points=len(state),
         n_merged=0,
         explained=explained,
@@ -225,13 +209,21 @@ def _record(state: Contraction, **facts: Any) -> Contraction:
         contraction_weight=state.contraction_weight,
         **facts,
     )
-    return replace(state, report=replace(state.report, iterations=(*iterations, record)))
+    return _noted(state, iterations=(*done, record))
 
 
-def _amend(state: Contraction, **facts: Any) -> Contraction:
-    *done, last = state.report.iterations
-    return replace(state, report=replace(state.report, iterations=(*done, replace(last, **facts))))
+def _reduced(state: Contraction, reducer: Reducer, start: float) -> Contraction:
+    """A state after a pass of the reducer, which is no stage of its own in the report."""
+    reduced = reducer(state)
+    *done, last = reduced.report.iterations
+    last = replace(last, n_merged=len(state) - len(reduced), seconds=time.perf_counter() - start)
+    return _noted(replace(reduced, report=with_filters(reduced.report, state.report)), iterations=(*done, last))
 
 
 def _finished(state: Contraction, reason: str, converged: bool = False) -> Contraction:
-    return replace(state, report=replace(state.report, stop_reason=reason, converged=converged))
+    return _noted(state, stop_reason=reason, converged=converged)
+
+
+def _noted(state: Contraction, **facts: Any) -> Contraction:
+    """A state with other facts in its report."""
+    return replace(state, report=replace(state.report, **facts))

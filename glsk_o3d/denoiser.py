@@ -82,13 +82,13 @@ def to_ridges(points: Points, passes: int) -> Points:
     if not points.noise.any():
         return points
     denoised = subspace_mean_shift(points.cloud, points.noise, passes, points.weight)
-    k, outlier = points.neighbours.shape[1], np.zeros(len(denoised), bool)
+    k = points.neighbours.shape[1]
     neighbours = nearest_moved(denoised, points.neighbours, points.noise > 0)
     away = denoised[neighbours[:, 1:]] - denoised[:, None]
     mean_distance = np.sqrt(np.einsum("nki,nki->nk", away, away)).mean(axis=1)
-    found = (local_outlier_ratio(mean_distance, neighbours) > DENOISED_RATIO) & (points.noise > DENOISED_NOISE)
-    if 0 < found.sum() <= len(denoised) - max(k, MIN_POINTS):
-        outlier = found
+    outlier = (local_outlier_ratio(mean_distance, neighbours) > DENOISED_RATIO) & (points.noise > DENOISED_NOISE)
+    if outlier.sum() > len(denoised) - max(k, MIN_POINTS):  # too few would be left
+        outlier[:] = False
     left, row = np.flatnonzero(~outlier), np.cumsum(~outlier) - 1
     if len(left) < len(denoised):
         row[outlier] = cKDTree(denoised[left]).query(denoised[outlier])[1]

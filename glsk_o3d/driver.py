@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, overload
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypedDict, overload
 
 import numpy as np
 
-from .contractor import Contractor
+from .contractor import Contractor, Reducer
 from .errors import InvalidCloudError, InvalidParameterError
 from .interop.clouds import SearchParam, open3d_class
 from .interop.packages import import_open3d
@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack  # which type checkers bring
 
 
+PipelineChoice: TypeAlias = Pipeline[Skeleton] | str | os.PathLike[str] | Mapping[str, Any]
+"""A pipeline, its name, the path of a recipe, or options for the default."""
+
+
 class Options(TypedDict, total=False):
     """The options of the filters in the named pipelines that `skeletonize` takes by their names alone."""
 
@@ -37,7 +41,7 @@ class Options(TypedDict, total=False):
     around: float
     thin_to: int | Literal["auto", "all"]
     k: int | Literal["auto", "published"] | SearchParam
-    reducer: Callable[[Contraction], Contraction] | None
+    reducer: Reducer | None
     stop: StopRule
     max_iterations: int
     initial_contraction: float
@@ -79,7 +83,7 @@ def skeletonize(
 @overload
 def skeletonize(
     cloud: Any,
-    pipeline: Pipeline[Skeleton] | str | os.PathLike[str] | Mapping[str, Any],
+    pipeline: PipelineChoice,
     *,
     on_iteration: OnIteration | None = ...,
     on_state: OnState | None = ...,
@@ -87,7 +91,7 @@ def skeletonize(
 ) -> Skeleton: ...
 def skeletonize(
     cloud: Any,
-    pipeline: Pipeline[Skeleton] | str | os.PathLike[str] | Mapping[str, Any] = "default",
+    pipeline: PipelineChoice = "default",
     *,
     on_iteration: OnIteration | None = None,
     on_state: OnState | None = None,
@@ -134,9 +138,7 @@ def skeletonize(
     return chosen_pipeline(pipeline, options)(cloud, on_iteration=on_iteration, on_state=on_state)
 
 
-def chosen_pipeline(
-    pipeline: Pipeline[Skeleton] | str | os.PathLike[str] | Mapping[str, Any], options: Mapping[str, Any]
-) -> Pipeline[Skeleton]:
+def chosen_pipeline(pipeline: PipelineChoice, options: Mapping[str, Any]) -> Pipeline[Skeleton]:
     """The pipeline that is meant, with options: what `skeletonize` takes."""
     if isinstance(pipeline, Mapping):
         return as_pipeline("default").with_options(pipeline, **options)

@@ -72,17 +72,6 @@ def in_words(error: BaseException) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 
-MOVED = {
-    **dict.fromkeys(("around", "thin_to"), "it is Thinner's, a filter of its own ahead of the RingBuilder"),
-    **dict.fromkeys(("frame", "drop_invalid"), "it is Sampler's, a filter of its own at the beginning"),
-    "outlier_factor": "it is OutlierRemover's, a filter of its own behind the Sampler",
-    "denoise": "it is Denoiser's, a filter of its own behind the OutlierRemover",
-    **dict.fromkeys(("root", "surface"), "it is Tracer's, a filter of its own behind the Refiner"),
-    **dict.fromkeys(("reduce_above", "min_support"), "it is gone, leave it out"),
-}
-"""What became of parameters of before, which recipes and scripts may still have."""
-
-
 def did_you_mean(word: str, known: Iterable[str], what: str) -> str:
     """The message for an unknown word: the known one that was meant, or all that there are.
 
@@ -95,6 +84,4 @@ def did_you_mean(word: str, known: Iterable[str], what: str) -> str:
     hint = f"did you mean {names[close[0]]!r}?" if word and close else listed
     if what.startswith("attribute") and hint != listed and len(names) <= 40:  # files differ in what they have
         hint = f"{hint} ({listed})"
-    if what.startswith("parameter"):  # in scripts with the filter's name ahead of it
-        hint = next((cure for old, cure in MOVED.items() if f"_{word}".endswith(f"_{old}")), hint)
     return f"no {what} is called {word!r}: {hint}"

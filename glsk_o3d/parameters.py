@@ -17,9 +17,6 @@ LARGEST_WHOLE = 2**63 - 1  # derived: of the numbers that NumPy counts with
 LARGEST, SMALLEST_LENGTH = 1e100, 1e-100  # derived: a float64 holds their cubes
 LONGEST_SHOWN = 200  # fitted: characters of a value that say what was meant
 
-TYPES = ("int", "float", "bool", "length", "point", "choice", "reducer", "stop")
-"""What a parameter may be; with a trailing ``?`` also None."""
-
 
 def parameter(
     default: Any,
@@ -74,12 +71,17 @@ def documented(cls: _Class) -> _Class:
         lines += [f"{field.name} : {kind}{unit}, default {field.default!r}", f"    {facts['doc']}"]
     if lines:
         text = inspect.cleandoc(cls.__doc__ or "")
-        if cls.__module__.startswith(f"{__package__}."):
+        if is_own(cls):
             page = f"docs/filters/{cls.__module__.rpartition('.')[2]}.md"
             prose, *rest = re.split(r"(?=\n\n\w[\w ]*\n-{3,}\n)", text, maxsplit=1)
             text = f"{prose}\n\nEvery option, and when to touch it: {page}.{''.join(rest)}"
         cls.__doc__ = f"{text}\n\nParameters\n----------\n" + "\n".join(lines) + "\n"
     return cls
+
+
+def is_own(cls: type) -> bool:
+    """Whether a class is of this package, not of a plugin."""
+    return cls.__module__.startswith(f"{__package__}.")
 
 
 NONE, UNWRITTEN, FROM = "none", "unwritten", "from"
@@ -117,7 +119,7 @@ class Parameters:
             ``"unwritten"``, which names it.
         """
         cls = type(self)
-        origin = {} if cls.__module__.startswith(f"{__package__}.") else {FROM: cls.__module__}
+        origin = {} if is_own(cls) else {FROM: cls.__module__}
         names = [field.name for field in dataclasses.fields(self)]  # type: ignore[arg-type]
         return {self.kind: cls.__name__, **origin, **{name: _plain(getattr(self, name)) for name in names}}
 
@@ -160,7 +162,7 @@ def problem_with(value: Any, facts: Any) -> str | None:
         return f"must be one of {listed}"
     if kind == "point":
         words = f"{listed} or " if choices else ""
-        return None if isinstance(value, str) and _point(value) else f"must be {words}a point such as '0.5,0,2'"
+        return None if isinstance(value, str) and resolve_point(value) else f"must be {words}a point such as '0.5,0,2'"
     if kind in ("reducer", "stop"):
         usable = callable(value) and not isinstance(value, type)
         return None if usable else f"must be a {kind}: an instance, not a class or a name"
@@ -201,20 +203,13 @@ def _problem_with_number(value: Any, whole: bool, facts: Any) -> str | None:
     return f"must be at most {high}" if high is not None and number > high else None
 
 
-def _point(text: str) -> tuple[float, ...] | None:
+def resolve_point(text: str) -> tuple[float, ...] | None:
+    """A point (x, y, z) written as ``"x,y,z"``; None if it is none."""
     try:
         numbers = tuple(map(float, text.split(",")))
     except ValueError:
         return None
     return numbers if len(numbers) == 3 and all(abs(number) <= LARGEST for number in numbers) else None
-
-
-def resolve_point(text: str) -> tuple[float, ...]:
-    """A point (x, y, z) written as ``"x,y,z"``."""
-    numbers = _point(text)
-    if numbers is None:
-        raise InvalidParameterError(f"point {text!r}: must be three numbers such as '0.5,0,2'")
-    return numbers
 
 
 def _percent(text: str) -> float | None:

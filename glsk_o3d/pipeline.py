@@ -5,15 +5,13 @@ from __future__ import annotations
 import dataclasses
 import logging
 import time
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import pairwise
 from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
 
 from .errors import GlskError, InvalidCloudError, InvalidParameterError, StageError, did_you_mean
 from .interop.clouds import Cloud, cloud_points
-from .interop.packages import following_open3d
-from .parameters import UNWRITTEN, Parameters
+from .parameters import UNWRITTEN, Parameters, is_own
 from .points import Points
 from .report import STOPPED_BY_CALLER, IterationRecord, Report, warn
 from .skeleton import Skeleton
@@ -61,16 +59,14 @@ class Filter(Parameters, Generic[Produced]):
     def __call__(
         self, data: Any, *, on_iteration: OnIteration | None = None, on_state: OnState | None = None
     ) -> Produced:
-        """Run the filter.
+        """Run the filter, as a pipeline of it alone.
 
         Parameters
         ----------
         data : cloud, Points, Contraction or Skeleton
             See `consumes`. A cloud is anything `glsk_o3d.skeletonize` takes.
-        on_iteration : callable, optional
-            Called with each IterationRecord of a contraction; return False to stop there and keep what is done.
-        on_state : callable, optional
-            Called before it with the Contraction itself, as it is after each solve and the merges that follow.
+        on_iteration, on_state : callable, optional
+            As of `Pipeline`.
 
         Returns
         -------
@@ -84,35 +80,7 @@ class Filter(Parameters, Generic[Produced]):
         StageError
             `data` is not what the filter takes, or what it gives is not what it promises.
         """
-        self.check()
-        result = self.run(data, on_iteration=on_iteration, on_state=on_state)
-        warn_of(result, data)
-        return result
-
-    def run(self, data: Any, *, on_iteration: OnIteration | None = None, on_state: OnState | None = None) -> Any:
-        """Run without checking parameters or issuing warnings, which are only in the report: a pipeline does both.
-
-        The next filter may resolve a warning.
-        """
-        name = type(self).__name__
-        if not (_is_of(data, self.consumes) or (_is_of(data, Cloud) and self.takes_clouds())):
-            raise StageError(f"{name} takes a {_named(self.consumes)}, not a {type(data).__name__}: {ORDER}")
-        start = time.perf_counter()
-        with following_open3d():
-            if self.consumes is Points and not isinstance(data, Points):
-                data = Points.of(data)
-            result = self._ran(data, _watch(on_iteration, on_state))
-            seconds = time.perf_counter() - start
-            _log.debug("%s took %.3f s: %r", name, seconds, result)
-        if result is None or not _is_of(result, self.produces):
-            raise StageError(f"{name} should give a {_named(self.produces)} and gave a {type(result).__name__}")
-        if self.produces is not Cloud:
-            return dataclasses.replace(result, report=with_stage(result.report, self, seconds))
-        try:
-            cloud_points(result)
-        except InvalidCloudError as error:
-            raise InvalidCloudError(f"{name} gave no usable cloud: {error}") from error
-        return result
+        return Pipeline(self)(data, on_iteration=on_iteration, on_state=on_state)
 
     @classmethod
     def takes_clouds(cls) -> bool:
@@ -126,17 +94,32 @@ class Filter(Parameters, Generic[Produced]):
         """The work itself; `watch` is None or wants the Contraction after each solve, and says False to stop."""
         raise NotImplementedError
 
-    def _ran(self, data: Any, watch: Watch | None) -> Any:
-        """What `_run` gives; where it fails and is not of this package, the error says whose it is."""
+    def run(self, data: Any, watch: Watch | None) -> Any:
+        """What `_run` gives, if it takes the data and gives what the filter promises.
+
+        Where a filter that is not of this package fails, the error says whose it is.
+        """
+        name = type(self).__name__
+        if not (_is_of(data, self.consumes) or (_is_of(data, Cloud) and self.takes_clouds())):
+            raise StageError(f"{name} takes a {_named(self.consumes)}, not a {type(data).__name__}: {ORDER}")
+        if self.consumes is Points and not isinstance(data, Points):
+            data = Points.of(data)
         try:
-            return self._run(data, watch)
+            result = self._run(data, watch)
         except (GlskError, MemoryError, Warning):
             raise
         except Exception as error:
-            cls = type(self)
-            if cls.__module__.startswith(f"{__package__}."):
+            if is_own(type(self)):
                 raise
-            raise StageError(f"{cls.__name__} of {cls.__module__} failed: {type(error).__name__}: {error}") from error
+            raise StageError(f"{name} of {self.__module__} failed: {type(error).__name__}: {error}") from error
+        if result is None or not _is_of(result, self.produces):
+            raise StageError(f"{name} should give a {_named(self.produces)} and gave a {type(result).__name__}")
+        if self.produces is Cloud:
+            try:
+                cloud_points(result)
+            except InvalidCloudError as error:
+                raise InvalidCloudError(f"{name} gave no usable cloud: {error}") from error
+        return result
 
 
 class Pipeline(Generic[Produced]):
@@ -194,18 +177,23 @@ class Pipeline(Generic[Produced]):
             Whatever the last filter gives.
         """
         self.check()
-        ahead, data = Report(), cloud
+        data, report = cloud, cloud.report if isinstance(cloud, FLOWS[1:]) else Report()
+        told = report.warnings
+        watch = _watch(on_iteration, on_state)
         for stage in self.stages:
             if on_stage is not None:
                 on_stage(stage)
-            start, given = time.perf_counter(), cloud
-            cloud = stage.run(cloud, on_iteration=on_iteration, on_state=on_state)
+            start = time.perf_counter()
+            data = stage.run(data, watch)
+            seconds = time.perf_counter() - start
+            _log.debug("%s took %.3f s: %r", type(stage).__name__, seconds, data)
             if stage.produces is Cloud:
-                ahead = with_stage(ahead, stage, time.perf_counter() - start)
-            elif ahead.stages and not isinstance(given, FLOWS[1:]):
-                cloud = dataclasses.replace(cloud, report=after(cloud.report, ahead))
-        warn_of(cloud, data)
-        return cloud
+                report = with_stage(report, stage, seconds)
+            else:
+                report = with_stage(with_filters(data.report, report), stage, seconds)
+                data = dataclasses.replace(data, report=report)
+        warn(message for message in report.warnings if message not in told)
+        return data
 
     def check(self) -> None:
         """Raise InvalidParameterError if a parameter of a stage is wrong."""
@@ -250,7 +238,8 @@ class Pipeline(Generic[Produced]):
         pipeline: Any = self
         names: dict[tuple[type[Parameters], str], str] = {}
         given = [*(options or {}).items(), *named.items()]
-        for name, value in sorted(given, key=lambda option: _turn(option[1])):
+        # a reducer or a rule is put in, or taken out, before its parameters change
+        for name, value in sorted(given, key=lambda option: (not callable(option[1]), option[1] is not None)):
             cls, field = pipeline.class_of_option(name)
             if (cls, field.name) in names:
                 raise InvalidParameterError(f"{names[cls, field.name]} and {name} are the same option: give it once")
@@ -294,12 +283,6 @@ class Pipeline(Generic[Produced]):
         return hash(self.stages)
 
 
-def warn_of(result: Any, data: Any) -> None:
-    """Issue the warnings in the report of a result, but for those that came with the data."""
-    before, now = (getattr(getattr(each, "report", None), "warnings", ()) for each in (data, result))
-    warn(message for message in now if message not in before)
-
-
 def parts(item: Pipeline | Parameters) -> Iterator[Parameters]:
     """Everything with parameters in a pipeline: its filters, and after each the reducer and the rule inside."""
     if isinstance(item, Pipeline):
@@ -310,13 +293,6 @@ def parts(item: Pipeline | Parameters) -> Iterator[Parameters]:
     for part in inner:
         if isinstance(part, Parameters):
             yield from parts(part)
-
-
-def _turn(value: Any) -> int:
-    """When it is the turn of an option: a reducer or a rule is put in, or taken out, before its parameters change."""
-    if callable(value):
-        return 0
-    return 1 if value is None else 2
 
 
 def _changed(item: Any, cls: type[Parameters], name: str, value: Any) -> Any:
@@ -333,29 +309,21 @@ def recipe_of(*tables: dict[str, Any]) -> dict[str, Any]:
     return {"glsk_o3d": {"version": RECIPE_VERSION}, "pipeline": list(tables)}
 
 
+def with_filters(report: Report, other: Report) -> Report:
+    """A report that says of another's filters that they ran, instead of its own."""
+    return dataclasses.replace(report, stages=other.stages, recipe=other.recipe, seconds=other.seconds)
+
+
 def with_stage(report: Report, stage: Filter, seconds: float) -> Report:
     """A report with one more filter in it."""
-    table = stage.table()
+    name, table = type(stage).__name__, stage.table()
     if report.stop_reason == STOPPED_BY_CALLER:
         table[UNWRITTEN] = f"the contraction was stopped by the caller after solve {len(report.iterations)}"
-    ran = Report(stages=(repr(stage),), recipe=recipe_of(table), seconds={type(stage).__name__: seconds})
-    return dataclasses.replace(report, **_filters_of(report, ran))
-
-
-def after(report: Report, ahead: Report) -> Report:
-    """A report with the filters of another ahead of its own: clouds carry no report of what made them."""
-    return dataclasses.replace(report, **_filters_of(ahead, report))
-
-
-def _filters_of(*reports: Report) -> dict[str, Any]:
-    """What ran in several reports, as keywords of one."""
-    seconds = Counter[str]()
-    for report in reports:
-        seconds.update(report.seconds)
-    return dict(
-        stages=sum((report.stages for report in reports), ()),
-        recipe=recipe_of(*(table for report in reports for table in report.recipe.get("pipeline", ()))),
-        seconds=dict(seconds),
+    return dataclasses.replace(
+        report,
+        stages=(*report.stages, repr(stage)),
+        recipe=recipe_of(*report.recipe.get("pipeline", ()), table),
+        seconds=report.seconds | {name: report.seconds.get(name, 0.0) + seconds},
     )
 
 

@@ -11,9 +11,10 @@ from scipy.spatial import cKDTree
 
 from .errors import StageError
 from .interop.clouds import cloud_counts, cloud_points, to_point_cloud
-from .numerics.frame import Frame, finite_points, to_working_frame
+from .numerics.frame import Frame, not_finite, to_working_frame
 from .numerics.grid_sampling import sample_cloud
-from .numerics.neighbourhoods import principal, sphericity
+from .numerics.neighbourhoods import principal, row_medians
+from .numerics.vectors import TINY
 from .report import Report
 
 Some = TypeVar("Some", bound="Representatives")
@@ -153,7 +154,9 @@ class Points(Representatives):
         InvalidCloudError as of `RingBuilder`.
         """
         points = cloud_points(cloud)
-        finite = finite_points(points, drop_invalid)
+        finite = np.isfinite(points).all(axis=1)
+        if not (drop_invalid or finite.all()):
+            raise not_finite(int((~finite).sum()), len(points), int(finite.argmin()))
         counts, n, dropped = cloud_counts(cloud, finite)
         given = points if finite.all() else points[finite]
         kept, position, counts = sample_cloud(given, size(n), counts)
@@ -260,9 +263,10 @@ def _measured(cloud: np.ndarray, neighbours: np.ndarray) -> dict[str, Any]:
 def noise_share(spread: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     """How far the neighbourhoods of a cloud are noise, from 0 to 1, (n,) float array.
 
-    That is how much they fill space: the sphericity, smoothed by the median, is near 0 on a surface and along a curve,
-    however dense, and 1 in a ball of noise (Demantke et al. 2011, "Dimensionality based scale selection in 3D lidar
-    point clouds"); from 0.2 to 0.35 it is mapped to 0 to 1.
+    That is how much they fill space: the sphericity, the least over the largest principal spread, smoothed by the
+    median, is near 0 on a surface and along a curve, however dense, and 1 in a ball of noise (Demantke et al. 2011,
+    "Dimensionality based scale selection in 3D lidar point clouds"); from 0.2 to 0.35 it is mapped to 0 to 1.
     """
-    rise = (sphericity(spread, neighbours) - CLEAN_SPHERICITY) / (NOISE_SPHERICITY - CLEAN_SPHERICITY)
+    sphericity = row_medians((spread[:, 0] / np.maximum(spread[:, 2], TINY)).take(neighbours))
+    rise = (sphericity - CLEAN_SPHERICITY) / (NOISE_SPHERICITY - CLEAN_SPHERICITY)
     return np.clip(rise, 0, 1)

@@ -11,12 +11,10 @@ from dataclasses import dataclass, field
 from functools import cache
 from html import escape
 from importlib.metadata import PackageNotFoundError, version
-from types import UnionType
-from typing import Any, Union, get_args, get_origin, get_type_hints
+from typing import Any, get_args, get_origin, get_type_hints
 
 from .decisions import QUESTIONS, Decision, Place, Supported
 from .errors import SkeletonWarning
-from .interop.packages import QUIET, open3d_is
 
 NOT_CONTRACTED = "not contracted"
 STOPPED_BY_CALLER = "stopped by the caller"
@@ -32,15 +30,12 @@ class IterationRecord:
     iteration : int
         Counted from 1.
     n_points, n_merged, n_held : int
-        Points of the solve, points merged after it, and points held because the solve would have thrown them out of the
-        bounding box.
+        Points of the solve, points merged after it, and points held because they would have left the bounding box.
     explained, explained_change : float
-        PCA score e of the contracted points, 1 for a straight line (Wen et al. 2024, equation 14), and De, its change
-        per share of points kept (equation 16).
-    ring_ratio : float
-        a(t), the sum of the ring sizes over that of the uncontracted cloud.
-    contraction_weight : float
-        w_L of the solve.
+        PCA score e of the contracted points, 1 for a straight line, and De, its change per share of points kept
+        (Wen et al. 2024, equations 14 and 16).
+    ring_ratio, contraction_weight : float
+        a(t), the sum of the ring sizes over that of the uncontracted cloud, and w_L of the solve.
     solve_error : float
         Estimated error of the linear solve, as a share of the cloud's size.
     seconds : float
@@ -70,16 +65,12 @@ class IterationRecord:
 def _read(value: Any, hint: Any, name: str = "it") -> Any:
     """A value of a file as its type has it, records from dicts and tuples from lists; ValueError for others."""
     kind, inner = get_origin(hint) or hint, get_args(hint)
-    if kind in (Union, UnionType):
-        for each in inner:
-            with suppress(ValueError):
-                return _read(value, each, name)
-    elif dataclasses.is_dataclass(kind) and isinstance(value, Mapping):
+    if dataclasses.is_dataclass(kind) and isinstance(value, Mapping):
         hints = get_type_hints(kind)
         known: Any = {key: _read(each, hints[key], key) for key, each in value.items() if key in hints}
         return kind(**known)  # type: ignore[operator]
     elif kind is tuple and isinstance(value, list | tuple):
-        items = inner[:1] * len(value) if Ellipsis in inner else [each for each in inner if each != ()]
+        items = inner[:1] * len(value) if Ellipsis in inner else inner
         if len(value) == len(items):
             return tuple(_read(each, item, name) for each, item in zip(value, items, strict=True))
     elif kind is dict and isinstance(value, dict):
@@ -92,29 +83,18 @@ def _read(value: Any, hint: Any, name: str = "it") -> Any:
     raise ValueError(f"{name} in its report is {repr(value)[:80]}")
 
 
-def _told(counts: Mapping[str, int]) -> str:
-    """Numbers with what they are of, but for zeros."""
-    return ", ".join(f"{n} {name}" for name, n in counts.items() if n)
-
-
 def html_table(rows: Iterable[Sequence[str]], heads: Sequence[str] = (), align: str = "left") -> str:
     """Texts as a table for a notebook, escaped; its style is in it, since not every notebook has Jupyter's sheet."""
-
-    def row(tag: str, texts: Sequence[str]) -> str:
-        cells = (f'<{tag} style="text-align:{align};padding:2px 10px">{escape(text)}</{tag}>' for text in texts)
-        return f"<tr>{''.join(cells)}</tr>"
-
-    head = f"<thead>{row('th', heads)}</thead>" if heads else ""
-    body = "".join(row("td", texts) for texts in rows)
-    style = "font:13px/1.5 system-ui,sans-serif;border-collapse:collapse;margin-top:4px"
-    return f'<table style="{style}">{head}<tbody>{body}</tbody></table>'
+    cell = f'<{{0}} style="text-align:{align};padding:2px 10px">{{1}}</{{0}}>'
+    lines = [*[("th", heads)] * bool(heads), *(("td", row) for row in rows)]
+    body = "".join(f"<tr>{''.join(cell.format(tag, escape(text)) for text in texts)}</tr>" for tag, texts in lines)
+    return f'<table style="font:13px/1.5 system-ui,sans-serif;border-collapse:collapse">{body}</table>'
 
 
 def warn(messages: Iterable[str]) -> None:
-    """Issue SkeletonWarnings, unless Open3D's verbosity is Error."""
+    """Issue SkeletonWarnings."""
     for message in messages:
-        if not open3d_is(QUIET):
-            _warnings.warn(message, SkeletonWarning, stacklevel=outside())
+        _warnings.warn(message, SkeletonWarning, stacklevel=outside())
 
 
 def outside() -> int:
@@ -156,23 +136,19 @@ class Report:
     decisions : tuple of Decision
         The questions about the topology, with probabilities and actions.
     n_draws, n_agreeing : int
-        Number of samples of the cloud compared by `glsk_o3d.support`, and of those with as many components, loops and
-        ends.
+        Samples of the cloud that `glsk_o3d.support` compared, and those with as many components, loops and ends.
     support : tuple of Supported
         Share of the samples with each branch, loop and end of this skeleton, and with loops and ends that it lacks.
     stages : tuple of str
         The filters that ran, as the expressions that rebuild them.
     recipe : dict
-        The pipeline as `glsk_o3d.from_recipe` reads it; empty if unknown. An entry ``"unwritten"`` names a part that a
-        recipe cannot hold.
+        The pipeline as `glsk_o3d.from_recipe` reads it; empty if unknown. ``"unwritten"`` names what it cannot hold.
     seconds : dict of str to float
         Wall time per filter.
     iterations : tuple of IterationRecord
-    converged : bool
-        Whether the stopping rule ended the contraction.
-    stop_reason : str
-    warnings : tuple of str
-    versions : dict of str to str
+    converged, stop_reason : bool, str
+        Whether the stopping rule ended the contraction, and why it ended.
+    warnings, versions : tuple of str, dict of str to str
 
     Examples
     --------
@@ -181,8 +157,6 @@ class Report:
     >>> report = skeletonize(torus(1000).points).report
     >>> report.n_input, report.converged, report.warnings
     (1000, True, ())
-    >>> list(report.seconds)
-    ['Sampler', 'OutlierRemover', 'Denoiser', 'Thinner', 'RingBuilder', 'Contractor', 'Connector', 'Refiner', 'Tracer']
     """
 
     n_input: int = 0
@@ -197,7 +171,7 @@ class Report:
     n_bridges: int = 0
     n_traced: int = 0
     joined: tuple[tuple[Place, Place], ...] = ()
-    root: Place | tuple[()] = ()
+    root: tuple[float, ...] = ()
     decisions: tuple[Decision, ...] = ()
     n_draws: int = 0
     n_agreeing: int = 0
@@ -213,35 +187,28 @@ class Report:
 
     def __str__(self) -> str:
         """What there is to say, in about ten lines; ``repr`` has it all."""
-        return "\n".join(["Report", *(f"{name:10} {words}".rstrip(": ") for name, words in self._told())])
+        return "\n".join(["Report", *(f"{name:11} {words}".rstrip() for name, words in self._told())])
 
     def _repr_html_(self) -> str:
-        return html_table((name, words.rstrip(": ")) for name, words in self._told())
+        return html_table(self._told())
 
     def _told(self) -> list[tuple[str, str]]:
         """The lines, each as a name and what there is to say of it; the warnings come last."""
-        counts = dict(
-            contracted=self.n_contracted, dropped=self.n_dropped, outliers=self.n_outliers, traced=self.n_traced
-        )
-        changes = {"loops closed": self.n_loops_closed, "branches cut": self.n_cuts, "gaps bridged": self.n_bridges}
-        lines = {
-            "stopped": f"{self.stop_reason}, after {len(self.iterations)} solves",
-            "points": f"{self.n_input}{f', of which {self.n_sampled} are sampled' * self.is_sampled}: {_told(counts)}",
-            "noise": f"{self.noise:.2f}",
-            "graph": _told(changes) or "nothing closed, cut or bridged",
-            "decisions": f"{len(self.decisions)}, {len(self.uncertain)} of them uncertain",
-            "uncertain": str(self.uncertain[0]) if self.uncertain else "",
-            "support": f"{self.n_agreeing} of {self.n_draws} samples have the same graph" if self.n_draws else "",
-            "weakest": str(self.unsupported[0]) if self.unsupported else "",
-            "seconds": f"{sum(self.seconds.values()):.2f}: "
-            + ", ".join(f"{k} {v:.2f}" for k, v in self.seconds.items()),
-            "versions": ", ".join(map(" ".join, self.versions.items())),
-        }
-        told = [(name, words) for name, words in lines.items() if words]
-        return told + [("warning", each) for each in self.warnings]
+        counts = {name[2:].replace("_", " "): value for name, value in vars(self).items() if name.startswith("n_")}
+        return [
+            ("stopped", f"{self.stop_reason}, after {len(self.iterations)} solves"),
+            ("counts", ", ".join(f"{value} {name}" for name, value in counts.items() if value)),
+            ("noise", f"{self.noise:.2f}"),
+            ("decisions", f"{len(self.decisions)}, {len(self.uncertain)} of them uncertain"),
+            *(("uncertain", str(each)) for each in self.uncertain[:1]),
+            *(("unsupported", str(each)) for each in self.unsupported[:1]),
+            ("seconds", ", ".join(f"{name} {value:.2f}" for name, value in self.seconds.items())),
+            ("versions", ", ".join(map(" ".join, self.versions.items()))),
+            *(("warning", each) for each in self.warnings),
+        ]
 
     def with_warning(self, message: str) -> Report:
-        """This report with one more warning, which a pipeline, or a filter called alone, issues at the end."""
+        """This report with one more warning, to be issued at the end."""
         return dataclasses.replace(self, warnings=(*self.warnings, message))
 
     @property
@@ -252,14 +219,12 @@ class Report:
     @property
     def uncertain(self) -> tuple[Decision, ...]:
         """Decisions with a probability between a quarter and three quarters, the least certain first."""
-        uncertain = (each for each in self.decisions if each.is_uncertain)
-        return tuple(sorted(uncertain, key=lambda each: abs(each.probability - 0.5)))
+        return tuple(sorted((it for it in self.decisions if it.is_uncertain), key=lambda it: abs(it.probability - 0.5)))
 
     @property
     def unsupported(self) -> tuple[Supported, ...]:
         """Parts that more than a fifth of the samples contradict, the most doubtful first."""
-        unsupported = (each for each in self.support if not each.is_well_supported)
-        return tuple(sorted(unsupported, key=lambda each: -each.doubt))
+        return tuple(sorted((it for it in self.support if not it.is_well_supported), key=lambda it: -it.doubt))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain dict of numbers, strings, lists and dicts, as saved in JSON."""
@@ -268,11 +233,11 @@ class Report:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Report:
         """Inverse of `to_dict`; unknown entries of later versions are ignored."""
-        if "judgements" in data:  # what decisions were called in files of before
-            data = {"decisions": data["judgements"], **data}
         report = _read(data, cls)
         if not all(decision.about in QUESTIONS for decision in report.decisions):
             raise ValueError("a decision in its report is about an unknown question")
+        if len(report.root) not in (0, 3):
+            raise ValueError("the root in its report is no place")
         if not isinstance(report.recipe.get("pipeline", []), list):
             raise ValueError("the recipe in its report has no list of stages")
         return report

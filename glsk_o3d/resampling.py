@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any, TypeAlias
 
@@ -15,7 +14,7 @@ from scipy.spatial.distance import cdist
 from .analysis.comparison import matched
 from .analysis.curves import along, pieces
 from .decisions import Supported
-from .driver import chosen_pipeline
+from .driver import PipelineChoice, chosen_pipeline
 from .errors import InvalidCloudError, SkeletonWarning
 from .numerics.cycles import minimum_cycle_basis
 from .numerics.groups import component_labels
@@ -42,7 +41,7 @@ _Missing: TypeAlias = tuple[str, int, np.ndarray, float]
 def support(
     cloud: Any,
     draws: int = 8,
-    pipeline: Pipeline[Skeleton] | str | os.PathLike[str] | Mapping[str, Any] = "default",
+    pipeline: PipelineChoice = "default",
     *,
     seed: int = 0,
     on_draw: Callable[[int, int], object] | None = None,

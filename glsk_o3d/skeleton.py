@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy as np
 from .errors import InvalidParameterError, brief
 from .interop.packages import import_open3d, require
 from .numerics.groups import component_labels
+from .numerics.paths import maximal_paths
 from .numerics.radii import supporting_points
 from .numerics.vectors import norm
 from .parameters import shown
@@ -176,23 +176,7 @@ class Skeleton:
 
         A loop without a junction starts and ends at the same vertex. A vertex without edges is no branch.
         """
-        neighbours: list[list[int]] = [[] for _ in self.vertices]
-        for a, b in self.edges.tolist():
-            neighbours[a].append(b)
-            neighbours[b].append(a)
-        left, paths = set(map(tuple, self.edges.tolist())), []
-        ends = np.flatnonzero((self.degree > 0) & (self.degree != 2)).tolist()
-        for start in ends + np.flatnonzero(self.degree == 2).tolist():
-            for step in neighbours[start]:
-                if (min(start, step), max(start, step)) not in left:
-                    continue
-                path = [start, step]
-                while path[-1] != start and len(neighbours[path[-1]]) == 2:
-                    before, (one, other) = path[-2], neighbours[path[-1]]
-                    path.append(other if one == before else one)
-                left.difference_update((min(edge), max(edge)) for edge in pairwise(path))
-                paths.append(np.array(path))
-        return tuple(paths)
+        return tuple(np.array(vertices) for vertices, _ in maximal_paths(len(self.vertices), self.edges))
 
     def to_networkx(self) -> networkx.Graph:
         """The graph with the attributes of every vertex.
@@ -226,19 +210,24 @@ class Skeleton:
         ------
         InvalidParameterError, MissingPackageError
         """
-        try:
-            paint = np.asarray(color, float)
-        except (TypeError, ValueError):
-            paint = np.empty(0)
-        if paint.shape != (3,) or not ((paint >= 0) & (paint <= 1)).all():
-            words = "must be three numbers from 0 to 1; glsk_o3d.to_line_set takes words, too"
-            raise InvalidParameterError(f"color = {color!r}: {words}")
+        paint = as_color(color, "must be three numbers from 0 to 1; glsk_o3d.to_line_set takes words, too")
         o3d = import_open3d()
         lines = o3d.geometry.LineSet()
         lines.points = o3d.utility.Vector3dVector(np.ascontiguousarray(self.vertices))
         lines.lines = o3d.utility.Vector2iVector(np.ascontiguousarray(self.edges, np.int32))
         lines.paint_uniform_color(paint)
         return lines
+
+
+def as_color(color: Any, words: str) -> np.ndarray:
+    """Three numbers from 0 to 1, (3,) float array; InvalidParameterError with these words for anything else."""
+    try:
+        paint = np.asarray(color, float)
+    except (TypeError, ValueError):
+        paint = np.empty(0)
+    if paint.shape != (3,) or not ((paint >= 0) & (paint <= 1)).all():
+        raise InvalidParameterError(f"color = {color!r}: {words}")
+    return paint
 
 
 def _complete(skeleton: Skeleton) -> None:
@@ -278,14 +267,8 @@ def _check_values(skeleton: Skeleton) -> None:
     _check_range(skeleton, "edges", 0, m - 1, there)
     _refuse(skeleton, "edges", skeleton.edges[:, 0] == skeleton.edges[:, 1], "joins a vertex with itself")
     _check_range(skeleton, "vertex_of_point", -1, m - 1, there)
-    _check_range(
-        skeleton,
-        "points",
-        -FARTHEST_PLACE,
-        FARTHEST_PLACE,
-        f"{finite}, as vertex_of_point gives it a vertex",
-        lambda points: (owner < 0)[:, None],
-    )
+    owned = f"{finite}, as vertex_of_point gives it a vertex"
+    _check_range(skeleton, "points", -FARTHEST_PLACE, FARTHEST_PLACE, owned, lambda points: (owner < 0)[:, None])
     _check_range(skeleton, "normals", -UNIT, UNIT, "must be unit vectors, or NaN", unless=np.isnan)
     for name in OF_VERTICES:
         most = 1.0 if name in ("confidence", "support") else FARTHEST_PLACE

@@ -1,17 +1,14 @@
 """When to stop contracting: small classes with one method."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TypeAlias
 
 from .parameters import Parameters, documented, parameter
 from .report import IterationRecord
 
-
-class StopRule(Protocol):
-    """Decides after every solve whether the contraction is finished."""
-
-    def __call__(self, iterations: tuple[IterationRecord, ...]) -> str | None:
-        """The reason to stop, or None to go on."""
+StopRule: TypeAlias = Callable[[tuple[IterationRecord, ...]], str | None]
+"""Decides after every solve whether the contraction is finished: the reason to stop, or None to go on."""
 
 
 @documented

@@ -7,9 +7,9 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from .numerics.eigen import principal_parts
-from .numerics.neighbourhoods import nearest_left, principal
+from .numerics.neighbourhoods import nearest_left, principal, wide_covariances
 from .numerics.pairing import Pairs, merge_pairs
-from .numerics.vectors import PAIRS, TINY
+from .numerics.vectors import TINY
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .points import Points, default_k
@@ -181,11 +181,7 @@ def points_around(points: np.ndarray, average: csr_array, spread: np.ndarray) ->
     but noise is seen.
     """
     k = average.nnz // len(points)
-    moments = np.column_stack([points, *(points[:, i] * points[:, j] for i, j in PAIRS)])
-    for _ in range(WIDER_STEPS):
-        moments = average @ moments
-    mean, square = moments[:, :3].T, moments[:, 3:].T
-    wider = principal_parts(square - [mean[i] * mean[j] for i, j in PAIRS])[0]
+    wider = principal_parts(wide_covariances(points, lambda values: average @ values, WIDER_STEPS)[0])[0]
     near = np.maximum(spread.T / k, TINY)
     sheet = np.minimum(wider[1] / (SHEET_FROM * np.maximum(wider[2], TINY)), 1)
     bent = np.maximum(wider[0] - near[0], 0) / np.maximum((wider[2] / near[2]) ** 2 - 1, TINY)

@@ -41,7 +41,7 @@ benchmark make bench --families tubes --seeds 100:101 --variants clean
 benchmark run bench ours
 benchmark score bench ours -o ours.json
 benchmark table ours.json
-rerun s.json -o again.json
+skeletonize demo/cloud.ply --pipeline s.json -o again.json
 run glskeleton demo/cloud.ply -o g.ply
 run scan_cleanup demo/cloud.ply -o c.ply
 crosscheck demo/cloud.ply

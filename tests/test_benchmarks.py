@@ -336,9 +336,7 @@ class TestCrosscheck:
 
     def test_scans(self, call, tmp_path):
         np.savetxt(tmp_path / "ring.xyz", torus(1000).points)
-        table = call("scans", tmp_path / "ring.xyz", "--pictures", tmp_path, "--jobs", 0)
-        assert "agrees (ball pivoting)" in table
-        assert (tmp_path / "ring.png").is_file()
+        assert "agrees (ball pivoting)" in call("scans", tmp_path / "ring.xyz", "--jobs", 0)
 
 
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")  # the work is done in this process

@@ -166,13 +166,20 @@ def test_every_public_name_has_its_task(package):
 NAMES = [(module, name) for module in (*api.PACKAGES, *api.MODULES) for name in api.names(module)]
 
 
+RETURNED = {  # what a function returns is tried in the example of that function
+    result
+    for module, name in NAMES
+    for result in re.findall(r"Returns\n-+\n(\w+)", inspect.getdoc(getattr(importlib.import_module(module), name)))
+}
+
+
 @pytest.mark.parametrize(("module", "name"), NAMES, ids=lambda word: word.removeprefix("glsk_o3d"))
 def test_every_public_name_is_documented(module, name):
     thing = getattr(importlib.import_module(module), name)
     told = inspect.getdoc(thing)
     assert told
     assert ".. math::" not in told  # has no number
-    if module in api.PACKAGES and name not in UNTRIED:
+    if module in api.PACKAGES and name not in (*UNTRIED, *RETURNED):
         assert ">>>" in told or issubclass(thing, Exception)
     if not inspect.isclass(thing):
         heads = re.findall(r"^([\w*, ]+?)(?: : .*)?$", told.partition("Parameters\n---")[2], re.MULTILINE)

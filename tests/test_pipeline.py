@@ -208,7 +208,6 @@ def test_what_is_put_in_may_be_varied_too(order):
     [
         ({"spaceing": 3}, {}, "'spacing'"),  # did you mean
         ({"RingBuilder.spacing": 3}, {}, "no parameter of RingBuilder"),
-        ({"RingBuilder.denoise": 3}, {}, "it is Denoiser's"),
         ({"Ringbuilder.k": 3}, {}, "which has Sampler, "),
         ({"RingSizeRatio.threshold": 3}, {}, "which has Sampler, "),
         ({"radius": 3}, {}, "'RingBuilder.radius' or 'Connector.radius'"),

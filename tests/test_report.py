@@ -69,18 +69,17 @@ def test_print_says_the_main_things_in_about_ten_lines():
     )
     said = str(report)
     for words in (
-        "points     900: 500 contracted, 2 dropped",
-        "graph      1 loops closed",
-        "uncertain  the loop at (0, 0.5, -2) is a handle: 0.45, loop closed",
-        "seconds    0.75: Sampler 0.25, Refiner 0.50",
-        "warning    sheet-like: so it is",
+        "counts      900 input, 2 dropped, 500 contracted, 1 loops closed",
+        "uncertain   the loop at (0, 0.5, -2) is a handle: 0.45, loop closed",
+        "seconds     Sampler 0.25, Refiner 0.50",
+        "warning     sheet-like: so it is",
     ):
         assert words in said.splitlines()
     assert len(said.splitlines()) <= 12
     html = replace(report, warnings=("a < b",))._repr_html_()
     assert html.count("<tr>") == len(said.splitlines()) - 1
     assert re.findall("<td [^>]*>([^<]*)</td>", html)[-2:] == ["warning", "a &lt; b"]
-    assert str(Report()).splitlines()[2] == "points     0"
+    assert str(Report()).splitlines()[2] == "counts"
     assert eval(repr(report.decisions)) == report.decisions
 
 

@@ -48,7 +48,6 @@ NAMES = {
     },
     "recipes": {
         "Writing and reading": ("save_recipe", "load_recipe", "to_recipe", "from_recipe"),
-        "The same result again": ("rerun",),
     },
     "io": {
         "As Open3D's and pymeshlab's": ("to_line_set", "to_tubes", "to_pymeshlab", "annotate"),
@@ -57,23 +56,23 @@ NAMES = {
         "For other programs": ("save_rig", "save_mesh"),
     },
     "viewing": {
-        "Pictures and pages": ("plot_skeleton", "save_preview", "save_report", "save_assessment"),
+        "Pictures and pages": ("plot_skeleton", "save_preview", "save_report"),
         "What happened on the way": ("ContractionRecorder",),
     },
     "analysis": {
-        "Branches": ("branch_table", "BranchTable", "segment", "curvature_torsion", "find_loops", "Loop"),
+        "Branches": ("branch_table", "BranchTable", "segment"),
         "Trees": ("tree_measures", "TreeMeasures", "cylinders", "Cylinders"),
         "Grasps": ("grasp_candidates", "GraspCandidates", "Gripper"),
-        "How good is it?": ("assess", "Assessment", "thickness"),
+        "How good is it?": ("assess", "Assessment"),
         "How far is it from a known axis?": ("compare", "Comparison", "Truth"),
     },
     "editing": {
         "Leave out": ("prune", "largest_component", "cut_loops"),
-        "Fewer vertices, smoother curves": ("simplify", "smooth"),
+        "Fewer vertices": ("simplify",),
         "Another root": ("reroot",),
     },
     "batch": {"Running": ("run_batch", "BatchResult"), "Looking before": ("plan_batch", "Plan")},
-    "crosscheck": {"The check": ("cross_check", "CrossCheck"), "Its picture": ("save_crosscheck_picture",)},
+    "crosscheck": {"The check": ("cross_check", "CrossCheck")},
     "samples": {
         "By name, and what they hold": ("sample_object", "Sample"),
         "With limbs": ("sauropod", "tree", "y_junction"),

@@ -152,12 +152,18 @@ def card_robots():
     skeleton = skeletonised(scan)
     grasps = grasp_candidates(skeleton, Gripper(0.25), cone=((0, 0, -1), 60), around=16)
     first = np.sort(np.unique(grasps.branch, return_index=True)[1])[:4]
-    lines = grasps[first].to_line_set()
+    best = grasps[first]
+    tip = best.position + best.depth[:, None] * best.approach
+    base = tip - best.gripper.finger[2] * best.approach
+    wrist = base - best.gripper.palm[2] * best.approach
+    side = best.opening[:, None] / 2 * best.closing
+    ends = np.stack([tip + side, base + side, base - side, tip - side, base, wrist], axis=1)
     figure, axes = card()
     angles = dict(azimuth=-62, elevation=16)
-    ends = np.asarray(lines.points)
-    portrait(axes, skeleton, scan, np.array(CARD), beside=[ends], **angles)
-    forks = view(ends, **angles)[np.asarray(lines.lines), :2]
+    portrait(axes, skeleton, scan, np.array(CARD), beside=[ends.reshape(-1, 3)], **angles)
+    forks = (
+        view(ends.reshape(-1, 3), **angles).reshape(-1, 6, 3)[:, [[0, 1], [1, 2], [2, 3], [4, 5]], :2].reshape(-1, 2, 2)
+    )
     axes.add_collection(LineCollection(forks, colors=INK, linewidths=3, capstyle="round", zorder=5))
     return figure
 

@@ -25,8 +25,6 @@ CHOSEN = {
     "plot_14_grasps": (1, (1,)),
 }
 """Which figure, and which of its panels, where it is not the last panel of the first figure."""
-PART = {"plot_05_libigl_crosscheck": (0.38, 0.16, 0.78, 0.8)}
-"""Left, top, right and bottom, as shares, of what is shown of a panel that is a picture itself."""
 
 
 def scrape(block, block_vars, gallery_conf):
@@ -44,7 +42,7 @@ def scrape(block, block_vars, gallery_conf):
         figure.canvas.draw()
         figure.set_layout_engine("none")
         drawings = [axes for axes in figure.axes if axes.get_label() != "<colorbar>"]
-        pictures = [panel(figure, drawings[place], len(panels), PART.get(script)) for place in panels]
+        pictures = [panel(figure, drawings[place], len(panels)) for place in panels]
         joined(pictures).save(folder / f"{script}.png", optimize=True)
     return rst
 
@@ -54,30 +52,29 @@ def columns(n):
     return min(n, 3) if n in (3, 5, 6) else math.ceil(math.sqrt(n))
 
 
-def panel(figure, axes, n, part):
+def panel(figure, axes, n):
     """One of n panels, alone, without title and scales, as large as fits; its curves are as thick in every picture."""
     room = (SIZE[0] // columns(n) - 2 * MARGIN, SIZE[1] // math.ceil(n / columns(n)) - 2 * MARGIN)
     for each in figure.axes:
         each.set_visible(each is axes)
     axes.set_title("")
     figure.set_dpi(SHARPNESS)
-    cropped = inked(figure, part)
+    cropped = inked(figure)
     scale = min(side / length for side, length in zip(room, cropped.size, strict=True))
     wider = THICK / math.sqrt(columns(n)) / (USUAL * SHARPNESS / 72 * scale)
     for curve in (each for each in axes.collections if isinstance(each, LineCollection)):
         curve.set_linewidth(wider * np.array(curve.get_linewidth()))
-    cropped = inked(figure, part)
+    cropped = inked(figure)
     cropped.thumbnail(room, Image.Resampling.LANCZOS)
     return cropped
 
 
-def inked(figure, part):
+def inked(figure):
     """What is not white."""
     figure.canvas.draw()
     picture = np.asarray(figure.canvas.buffer_rgba())[..., :3]
     rows, across = np.nonzero((picture < 250).any(axis=2))
-    cropped = Image.fromarray(picture[rows.min() : rows.max() + 1, across.min() : across.max() + 1])
-    return cropped.crop([round(p * side) for p, side in zip(part, 2 * cropped.size, strict=True)]) if part else cropped
+    return Image.fromarray(picture[rows.min() : rows.max() + 1, across.min() : across.max() + 1])
 
 
 def joined(pictures):

@@ -6,23 +6,18 @@ Everything starts with the rings. On a mesh they are known: so reconstruct one, 
 it, and see where the two disagree. No truth is needed.
 """
 
-from pathlib import Path
-from tempfile import TemporaryDirectory
-
 import matplotlib.pyplot as plt
 import numpy as np
 
-from glsk_o3d.crosscheck import cross_check, save_crosscheck_picture
+import glsk_o3d as glsk
+from glsk_o3d.crosscheck import cross_check
 from glsk_o3d.samples import y_junction
 
 
-def show(check, title):
-    with TemporaryDirectory() as folder:
-        save_crosscheck_picture(check, Path(folder, "check.png"), title=title)
-        picture = plt.imread(Path(folder, "check.png"))
-    axes = plt.figure(figsize=(10, 10 * picture.shape[0] / picture.shape[1])).add_axes((0, 0, 1, 1))
-    axes.imshow(picture)
-    axes.set_axis_off()
+def show(check):
+    """The skeleton, and the points by their angle, pale where it is small; grey ones could not be compared."""
+    colors = plt.colormaps["YlOrRd"].with_extremes(bad="lightgrey")(check.angle / 60)[:, :3]
+    glsk.plot_skeleton(check.skeleton, cloud=check.points, point_colors=colors, color=(0, 0, 0))
 
 
 # %%
@@ -31,7 +26,7 @@ def show(check, title):
 clean = y_junction(4096).points
 check = cross_check(clean)
 print(check.verdict, check.rows.angle)
-show(check, "Clean")
+show(check)
 plt.show()
 
 # %%
@@ -46,7 +41,7 @@ print(
     f"doubtful: {check.doubtful[clean[:, 0] < -0.1].mean():.0%} of the noisy arm, "
     f"{check.doubtful[clean[:, 0] > 0].mean():.0%} of the rest"
 )
-show(check, "One arm noisy")
+show(check)
 plt.show()
 
 # %%

@@ -7,6 +7,7 @@ is how false loops are told from handles.
 """
 
 import matplotlib.pyplot as plt
+import networkx as nx
 
 import glsk_o3d as glsk
 from glsk_o3d.samples import sauropod
@@ -37,17 +38,9 @@ for it in skeleton.report.decisions:
         print(it)
 
 # %%
-# What remains: the vertices of the loop, the radius of the largest circle inside it, and how probable it is that it is
-# a handle.
+# The loop that remains is the handle: its two feet meet in the trunk.
 
-(loop,) = glsk.analysis.find_loops(skeleton)
-print(
-    f"{len(loop.vertices)} vertices, opening {loop.opening:.3f}, a handle with probability {loop.probability:.2f}"
-)
-
-# %%
-# The loop is the handle: its two feet meet in the trunk.
-
+(loop,) = nx.cycle_basis(skeleton.to_networkx())
 figure = plt.figure(figsize=(12, 3), layout="constrained")
 left, middle, right = (figure.add_subplot(1, 3, place, projection="3d") for place in (1, 2, 3))
 glsk.plot_skeleton(graph, left, line_width=1).set_title(f"raw graph: {graph.n_loops} loops")
@@ -58,7 +51,7 @@ glsk.plot_skeleton(skeleton, right, color=(0.6, 0.6, 0.6)).set_title(
     f"recommended: {skeleton.n_loops}"
 )
 right.plot(
-    *skeleton.vertices[[*loop.vertices, loop.vertices[0]]].T,
+    *skeleton.vertices[[*loop, loop[0]]].T,
     color="crimson",
     linewidth=3,
     zorder=3,

@@ -6,6 +6,7 @@ What a robot does with two depth images: find the table and the mug on it, the m
 take the mug without touching anything else.
 """
 
+import warnings
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -71,7 +72,8 @@ plane, below = cloud.segment_plane(distance_threshold=0.003, ransac_n=3, num_ite
 above = cloud.select_by_index(below, invert=True)
 label = np.array(above.cluster_dbscan(eps=0.01, min_points=10))
 above = above.select_by_index(np.flatnonzero(label == np.bincount(label[label >= 0]).argmax()))
-with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore", glsk.SkeletonWarning)
     skeleton = glsk.skeletonize(above)
 print(skeleton, *skeleton.report.warnings, sep="\n")
 
@@ -82,7 +84,7 @@ print(skeleton, *skeleton.report.warnings, sep="\n")
 gripper = Gripper(max_opening=0.08)
 options = dict(cone=((0, 0, -1), 95), around=12, spacing=0.006, clearance=0.006)
 blind = grasp_candidates(skeleton, gripper, cloud=(), **options)
-safe = grasp_candidates(skeleton, gripper, obstacles=plane, **options)
+safe = grasp_candidates(skeleton, gripper, obstacles=[plane], **options)
 print(f"{len(blind)} by the skeleton alone, {len(safe)} that touch nothing else")
 print(*safe.left_out.items(), sep="\n")
 

@@ -39,7 +39,7 @@ print(
 
 measures = glsk.analysis.tree_measures(tree)
 print(f"height {measures.height:.2f} m, diameter at 1.3 m {measures.stem_diameter:.3f} m")
-print(f"crown {measures.crown_width:.2f} m wide, {measures.crown_area:.1f} m2 from above")
+print(f"the lowest branch leaves the stem at {measures.crown_base:.2f} m")
 for order, volume in enumerate(measures.volume):
     print(f"order {order}: {measures.length[order]:6.2f} m, {1000 * volume:7.2f} litres")
 

@@ -1,6 +1,6 @@
 """How a skeleton lies in its cloud, without knowing the truth."""
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,13 +9,12 @@ from scipy.spatial.distance import cdist
 
 from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.clouds import cloud_points
+from ..numerics.cycles import inscribed_circle, minimum_cycle_basis
 from ..numerics.frame import check_extent
 from ..numerics.groups import component_labels, group_median, group_sum
 from ..numerics.neighbourhoods import nearest_neighbours, plane_axes
 from ..numerics.polylines import arc_lengths, place_at
-from ..numerics.vectors import dot, norm, unit
 from ..skeleton import Skeleton
-from .loops import opening_cycles
 
 CLUSTER_NEIGHBOURS = 16  # fitted: of each point, in the graph whose components are the clusters of a cloud
 MIN_SECTION_POINTS = 6  # fitted: below which a place counts as outside
@@ -28,25 +27,9 @@ FAR_FROM_SECTION = 3.0
 MIN_ARC_VARIANCE = 0.1
 
 
-@dataclass(frozen=True)
-class LoopWidth:
-    """How wide a loop of a skeleton opens: the radius of the largest circle inside it, and of the tube that makes it.
-
-    The latter is the median over its vertices of the nearest cross-section's.
-    """
-
-    opening: float
-    tube_radius: float
-
-    @property
-    def wider(self) -> bool:
-        """Whether it opens wider than its tube, as every true loop does."""
-        return self.opening > self.tube_radius
-
-
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """How well a skeleton fits its cloud: four measures without units, from 0 to 1. 1 is best.
+    """How well a skeleton fits its cloud: three measures without units, from 0 to 1. 1 is best.
 
     They need no truth, so they miss some errors: parts of the cloud without a branch, and missing loops, cost little
     or nothing. Noise and one-sided scans cost something even on the true axis. So compare skeletons of one cloud.
@@ -60,48 +43,31 @@ class Assessment:
         section's radius.
     boundedness : float
         Share of the length from which the cross-section is seen in more than a third of all directions.
-    smoothness : float
-        1 minus the turn of the curve per radius of length, in half turns; at least 0.
     topology : float
         min(components, clusters) / max(components, clusters), times the share of the loops that open wider than their
         tube (1 without loops).
     components, clusters : int
         Connected parts of the skeleton, and of the cloud when every point is joined to its 15 nearest.
-    loops : tuple of LoopWidth
-        A minimum cycle basis of the skeleton, shortest first. `opening` is the radius of the largest circle inside a
-        loop in the cloud's units, `tube_radius` that of the tube that makes it, and `wider` whether it opens wider.
+    loops, wide_loops : int
+        Loops of a minimum cycle basis of the skeleton; those that open wider than their tube: the largest circle inside
+        has a larger radius than the median of the nearest cross-sections.
     edge_centredness : (E,) float array
         max(0, 1 - d / r) of the cross-section nearest to the middle of each edge, NaN in the empty ball of a junction.
         Not part of `as_dict`.
-
-    Examples
-    --------
-    >>> from glsk_o3d import skeletonize
-    >>> from glsk_o3d.samples import torus
-    >>> points = torus(2000).points
-    >>> found = assess(skeletonize(points), points)
-    >>> found.centredness > 0.8, found.topology
-    (True, 1.0)
     """
 
     centredness: float
     boundedness: float
-    smoothness: float
     topology: float
     components: int
     clusters: int
-    loops: tuple[LoopWidth, ...]
+    loops: int
+    wide_loops: int
     edge_centredness: np.ndarray = field(repr=False)
 
-    @property
-    def wide_loops(self) -> int:
-        """Loops that open wider than their tube."""
-        return sum(loop.wider for loop in self.loops)
-
     def as_dict(self) -> dict[str, Any]:
-        """The numbers, as JSON holds them; `loops` is a list of dicts with `opening`, `tube_radius` and `wider`."""
-        shown = {name: value for name, value in vars(self).items() if name != "edge_centredness"}
-        return {**shown, "loops": [{**asdict(loop), "wider": loop.wider} for loop in self.loops]}
+        """The numbers, as JSON holds them."""
+        return {name: value for name, value in vars(self).items() if name != "edge_centredness"}
 
 
 def assess(skeleton: Skeleton, points: Any) -> Assessment:
@@ -132,8 +98,8 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
     >>> straight = tube(2000)
     >>> axis = Skeleton(straight.nodes, straight.edges, straight.radii, (), (), ())
     >>> found = assess(axis, straight.points)
-    >>> found.boundedness, found.smoothness, found.topology
-    (1.0, 1.0, 1.0)
+    >>> found.boundedness, found.topology
+    (1.0, 1.0)
     """
     cloud = cloud_points(points)
     cloud = np.unique(cloud[np.isfinite(cloud).all(axis=1)], axis=0)
@@ -158,18 +124,18 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
     bounded = found & (sections.open_angles < OPEN_ANGLE)
     nearest = cKDTree(sections.places[found])
     radius = radii[nearest.query(skeleton.vertices)[1]]
-    loops = tuple(LoopWidth(opening, float(np.median(radius[cycle]))) for cycle, opening in opening_cycles(skeleton))
+    cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
+    wide = sum(inscribed_circle(skeleton.vertices[cycle])[1] > np.median(radius[cycle]) for cycle in cycles)
     components = skeleton.n_components
     agreement = min(components, clusters) / max(components, clusters)
-    wide = sum(loop.wider for loop in loops) / len(loops) if loops else 1.0
     return Assessment(
         centredness=float(np.average(centred, weights=sections.lengths[found])),
         boundedness=float(np.average(bounded[counted], weights=sections.lengths[counted])),
-        smoothness=max(0.0, 1 - _turning(skeleton, radius) / (np.pi * skeleton.length)),
-        topology=agreement * wide,
+        topology=float(agreement * (wide / len(cycles) if cycles else 1)),
         components=components,
         clusters=clusters,
-        loops=loops,
+        loops=len(cycles),
+        wide_loops=int(wide),
         edge_centredness=np.where(_at_junctions(skeleton, middles, cloud), np.nan, centred[nearest.query(middles)[1]]),
     )
 
@@ -189,20 +155,6 @@ def _at_junctions(skeleton, places, cloud):
     junctions = skeleton.vertices[skeleton.junctions]
     clearance = cKDTree(cloud).query(junctions)[0]
     return (cdist(places, junctions) < clearance).any(axis=1)
-
-
-def _turning(skeleton, radius):
-    """Sum over the vertices with two edges of the angle between these, times the radius there."""
-    inner = np.flatnonzero(skeleton.degree == 2)
-    ends = np.concatenate([skeleton.edges, skeleton.edges[:, ::-1]])
-    ends = ends[skeleton.degree[ends[:, 0]] == 2]
-    onward = ends[np.argsort(ends[:, 0], kind="stable"), 1].reshape(-1, 2)
-    before, after = (skeleton.vertices[onward] - skeleton.vertices[inner, None]).swapaxes(0, 1)
-    # between the one edge and the other turned back; the arctangent is exact also near 0, where the arccosine is not
-    straight = (before == 0).all(axis=1) | (after == 0).all(axis=1)
-    before, after = unit(before), unit(after)
-    angle = np.arctan2(norm(np.cross(before, after)), -dot(before, after))
-    return float((np.where(straight, 0, angle) * radius[inner]).sum())
 
 
 class Sections(NamedTuple):

@@ -1,7 +1,6 @@
 """The branches of a skeleton, measured one by one: a row of measures for each."""
 
 import heapq
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,21 +13,17 @@ from ..numerics.vectors import norm
 from ..refinement.rooted import root_among
 from ..report import html_table
 from ..skeleton import Skeleton
-from .curves import curvature_torsion
 from .rows import Rows
 from .segmentation import branch_of_point
 
 # fitted: radii from a junction between which a branch has its direction; nearer, parts blend
 HEADING_SPAN = (1.0, 3.0)
 FAIR_SHARE = 0.3  # fitted: of the greatest growth length at a junction; on conifers, and plants with long leaves
-TABLE_UNITS = "lengths in the cloud's units, angles in degrees"
-PRINTED_ROWS = 20  # at most; fitted to a screen
-PRINTED_COLUMNS = {
-    **dict(branch="d", kind="s", parent="d", level="d", axis="d", order="d", length=".4g", mean_radius=".3g"),
-    **dict(start_radius=".3g", end_radius=".3g", tortuosity=".2f", angle=".1f", points="d"),
-    **dict(confidence=".2f", support=".2f"),
-}
-"""The columns that people read, each with its format."""
+PRINTED_COLUMNS = (
+    *("branch", "kind", "parent", "level", "axis", "order", "length", "mean_radius", "start_radius", "end_radius"),
+    *("tortuosity", "angle", "points", "confidence", "support"),
+)
+"""The columns that people read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +51,6 @@ class BranchTable(Rows, row="branch"):
     angle : (B,) float array
         Degrees between the directions of parent and branch at their junction: 0 goes straight on. NaN without a parent,
         and for a closed branch or parent.
-    mean_curvature, mean_torsion : (B,) float arrays
-        See `curvature_torsion`.
     points : (B,) int array
         Points of the skeleton's cloud that belong to the branch; see `segment`.
     confidence, support : (B,) float arrays
@@ -67,14 +60,6 @@ class BranchTable(Rows, row="branch"):
         The first row of the axis of the branch. At a junction the thickest and straightest of the branches with much
         growth beyond them continues the axis. Centrifugal (Gravelius) order: 0 for axes at the root, and one more for
         each axis that grows from another.
-
-    Examples
-    --------
-    >>> from glsk_o3d import skeletonize
-    >>> from glsk_o3d.samples import y_junction
-    >>> table = branch_table(skeletonize(y_junction(2000).points))
-    >>> len(table), list(table)[0]["kind"], table.length.shape
-    (3, 'tip', (3,))
     """
 
     kind: np.ndarray
@@ -91,8 +76,6 @@ class BranchTable(Rows, row="branch"):
     start_radius: np.ndarray
     end_radius: np.ndarray
     angle: np.ndarray
-    mean_curvature: np.ndarray
-    mean_torsion: np.ndarray
     points: np.ndarray
     confidence: np.ndarray
     support: np.ndarray
@@ -103,35 +86,28 @@ class BranchTable(Rows, row="branch"):
         return f"BranchTable({len(self)} branches, {self.level.max(initial=-1) + 1} levels)"
 
     def printed(self) -> dict[str, list[str]]:
-        """The main columns, with a dash for unknown values, and the support only if known."""
-        columns = self._columns()
+        """The main columns in four digits, with a dash for unknown values, and the support only if known."""
+        columns = {name: values for name, values in self._columns().items() if name in PRINTED_COLUMNS}
         if not np.isfinite(self.support).any():
             del columns["support"]
 
-        def cell(name, value):
-            unknown = math.isnan(value) if isinstance(value, float) else name == "parent" and value < 0
-            return "-" if unknown else format(value, PRINTED_COLUMNS[name])
+        def cell(value):
+            if isinstance(value, float):
+                return "-" if np.isnan(value) else f"{value:.4g}"
+            return str(value)
 
-        return {name: [cell(name, value) for value in columns[name]] for name in PRINTED_COLUMNS if name in columns}
+        return {name: list(map(cell, values)) for name, values in columns.items()}
 
     def __str__(self):
-        columns = self._cut()
-        for column in columns:
-            width = max(map(len, column))
-            column[:] = [text.ljust(width) if column[0] == "kind" else text.rjust(width) for text in column]
-        lines = ["  ".join(row).rstrip() for row in zip(*columns, strict=True)]
-        return "\n".join([f"{self!r}: {TABLE_UNITS}", *lines])
+        columns = [[name, *cells] for name, cells in self.printed().items()]
+        widths = [max(map(len, column)) for column in columns]
+        lines = ("  ".join(map(str.rjust, row, widths)) for row in zip(*columns, strict=True))
+        return "\n".join([repr(self), *lines])
 
     def _repr_html_(self):
-        heads, *rows = zip(*self._cut(), strict=True)
-        return f"<p>{self!r}: {TABLE_UNITS}</p>{html_table(rows, [head.replace('_', ' ') for head in heads], 'right')}"
-
-    def _cut(self):
-        """The printed columns, each under its name; of a long table the first rows and the last ones."""
-        columns = [[name, *cells] for name, cells in self.printed().items()]
-        for column in columns if len(self) > PRINTED_ROWS else ():
-            column[PRINTED_ROWS - 4 : -4] = ["..." if column is columns[0] else ""]
-        return columns
+        columns = self.printed()
+        rows = zip(*columns.values(), strict=True)
+        return f"<p>{self!r}</p>{html_table(rows, [head.replace('_', ' ') for head in columns], 'right')}"
 
 
 @np.errstate(all="ignore")  # a file may hold coordinates whose squares no float64 holds
@@ -182,7 +158,6 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
     outward = [path[::-1] if turn else path for path, turn in zip(paths, backwards, strict=True)]
     start, end = (np.array([path[i] for path in outward]) for i in (0, -1))
     first, last = skeleton.vertices[start], skeleton.vertices[end]
-    curvature, torsion = curvature_torsion(skeleton)
     label = branch_of_point(skeleton, skeleton.points, skeleton.vertex_of_point)
     angle = np.array([_angle(skeleton, outward, i, parent[i]) for i in range(len(paths))])
     mean_radius = mean(skeleton.radii)
@@ -202,8 +177,6 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
         start_radius=skeleton.radii[start],
         end_radius=skeleton.radii[end],
         angle=angle,
-        mean_curvature=mean(curvature),
-        mean_torsion=mean(torsion),
         points=np.bincount(label[label >= 0], minlength=len(paths)),
         confidence=mean(skeleton.confidence),
         support=np.array([skeleton.support[path].min() for path in paths]),

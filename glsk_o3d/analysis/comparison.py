@@ -37,14 +37,6 @@ class Truth:
     InvalidParameterError
         There are no nodes, shapes do not fit, a number is not finite, a radius is not positive, or an edge names a
         missing node.
-
-    Examples
-    --------
-    >>> from glsk_o3d.samples import torus
-    >>> ring = torus(1000)
-    >>> truth = Truth(ring.nodes, ring.edges, ring.radii)
-    >>> len(truth.nodes) == len(ring.nodes)
-    True
     """
 
     nodes: np.ndarray
@@ -95,15 +87,6 @@ class Comparison:
         Whether components and loops agree; and also all leaves are matched: `tips_f1` is 1.
     edge_error : (E,) float array
         `error` of each edge of the skeleton. Not part of `as_dict`.
-
-    Examples
-    --------
-    >>> from glsk_o3d import skeletonize
-    >>> from glsk_o3d.samples import torus
-    >>> ring = torus(2000)
-    >>> found = compare(skeletonize(ring.points), ring)
-    >>> found.error < 0.2, found.loops, found.topology
-    (True, 0, True)
     """
 
     error: float

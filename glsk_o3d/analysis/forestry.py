@@ -1,4 +1,4 @@
-"""Forest measures of a tree: height, stem, crown, volume by order; and doubts about them."""
+"""Forest measures of a tree: height, stem, volume by order; and doubts about them."""
 
 from __future__ import annotations
 
@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
-from scipy.spatial.distance import pdist
 
 from ..errors import InvalidParameterError, SkeletonWarning
-from ..numerics.circles import CircleFit, fit_circle
 from ..numerics.neighbourhoods import plane_axes
 from ..numerics.vectors import AXES, TINY, along_axis, norm
 from ..numerics.vectors import unit as directions
 from ..skeleton import Skeleton
+from .circles import CircleFit, fit_circle
 from .trees import OUTSIDE, Cylinders, cylinders, metres
 
 BREAST_HEIGHT = 1.3  # published: metres above the ground at which foresters measure stems
@@ -33,7 +31,7 @@ UNKNOWN = CircleFit(np.zeros(2), np.nan, (np.nan, np.nan), np.nan, np.nan, 0)
 
 @dataclass(frozen=True)
 class TreeMeasures:
-    """A tree in numbers. Lengths are in metres, areas in square metres, volumes in cubic metres.
+    """A tree in numbers. Lengths are in metres, volumes in cubic metres.
 
     Attributes
     ----------
@@ -46,12 +44,9 @@ class TreeMeasures:
         Degrees of that circle with points; root mean square distance of these points, and their number.
     crown_base : float
         Height at which the lowest branch leaves the stem; NaN without one.
-    crown_width, crown_area : float
-        Largest horizontal distance of two points of the crown, of branches and of the stem above the lowest one; of its
-        convex hull as seen from above.
-    length, area, volume : tuple of float
-        Length of the axes, lateral surface and volume of each order, the stem first; see `Cylinders`. The volume is
-        that of parts with a surface: confidence above 0, or unknown.
+    length, volume : tuple of float
+        Length of the axes and volume of each order, the stem first; see `Cylinders`. The volume is that of parts with a
+        surface: confidence above 0, or unknown.
     volume_interval : (low, high)
         Interval of the whole volume, with 8 % on either side as on scanned trees. Traced parts are between nothing and
         as thick as the parts that they grow from.
@@ -62,14 +57,6 @@ class TreeMeasures:
         The foot of the stem in the cloud's units, the axis that points up, and the metres of one unit.
     doubts : tuple of str
         The warnings about implausible results.
-
-    Examples
-    --------
-    >>> from glsk_o3d import pipelines
-    >>> from glsk_o3d.samples import y_junction
-    >>> measures = tree_measures(pipelines.tree()(y_junction(2000).points))
-    >>> len(measures.volume), measures.height > 0.5
-    (2, True)
     """
 
     height: float
@@ -79,10 +66,7 @@ class TreeMeasures:
     stem_rms: float
     stem_points: int
     crown_base: float
-    crown_width: float
-    crown_area: float
     length: tuple[float, ...]
-    area: tuple[float, ...]
     volume: tuple[float, ...]
     volume_interval: tuple[float, float]
     traced: float
@@ -148,9 +132,6 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
     near = _points_near(skeleton)
     highest = float(max(high, height(skeleton.points[near]).max(initial=high)))
     leaving = bottom[(pieces.order == 1) & stem[pieces.parent]]
-    crowning = ~stem | (bottom > leaving.min(initial=np.inf))
-    crown = unit * np.concatenate([pieces.start_point[crowning], pieces.end_point[crowning]])
-    width, area = _extent(np.delete(crown, "xyz".index(up[-1]), axis=1))
     sums = _sums_by_order(pieces, unit)
     section, unknown = _stem_section(skeleton, pieces, bottom, top, near, unit)
     doubts = _find_doubts(-low / max(high - low, TINY), highest, section, unknown, sum(sums["volume"]), up, unit)
@@ -164,8 +145,6 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
         stem_rms=section.rms,
         stem_points=section.points,
         crown_base=float(leaving.min()) if len(leaving) else np.nan,
-        crown_width=width,
-        crown_area=area,
         **sums,
         root=tuple(ground.tolist()),
         up=up,
@@ -256,20 +235,8 @@ def _sums_by_order(pieces: Cylinders, unit: float) -> dict[str, Any]:
     known = 1.0 if np.isfinite(pieces.confidence).all() else np.nan
     return dict(
         length=by_order(pieces.length, 1),
-        area=by_order(pieces.area, 2),
         volume=volume,
         volume_interval=((1 - VOLUME_SLACK) * sum(volume), (1 + VOLUME_SLACK) * (sum(volume) + added)),
         traced=known * float(pieces.length[traced].sum() / max(pieces.length.sum(), TINY)),
         traced_volume=known * unit**3 * float(pieces.volume[traced].sum()),
     )
-
-
-def _extent(places: np.ndarray) -> tuple[float, float]:
-    """Largest distance, and area of the convex hull, of places in a plane."""
-    if len(places) == 0:
-        return 0.0, 0.0
-    try:
-        hull = ConvexHull(places)
-    except (QhullError, ValueError):  # they are on a line
-        return float(np.linalg.norm(np.ptp(places, axis=0))), 0.0
-    return float(pdist(places[hull.vertices]).max()), float(hull.volume)

@@ -1,6 +1,5 @@
 """What a gripper would run into on its straight way in: points, and what lies behind a plane."""
 
-from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -176,28 +175,17 @@ def hits_plane(ways: Ways, plane: np.ndarray, middle: np.ndarray, low: np.ndarra
 
 def obstacle_list(given: Any) -> list[np.ndarray]:
     """Obstacles as arrays: (4,) for a plane, (n, 3) for a cloud. InvalidParameterError for a plane without a normal."""
-    if given is None:
-        return []
+    if not isinstance(given, list | tuple):
+        raise InvalidParameterError("obstacles must be a list of clouds and planes, also where there is but one")
     found = []
-    for each in [given] if _is_one(given) else given:
-        if not open3d_class(each)[0] and np.ndim(each) == 1:
-            plane = np.asarray(each, float)
-            if len(plane) != 4 or not (np.isfinite(plane).all() and plane[:3].any()):
-                raise InvalidParameterError(
-                    f"{list(each)} is no plane: give finite a, b, c, d of ax + by + cz + d = 0, a, b, c not all 0"
-                )
-            found.append(plane)
-        else:
+    for each in given:
+        if open3d_class(each)[0] or np.ndim(each) > 1 or isinstance(each, str):
             found.append(cloud_points(each))
+            continue
+        plane = np.ravel(np.asarray(each, float))
+        if len(plane) != 4 or not (np.isfinite(plane).all() and plane[:3].any()):
+            raise InvalidParameterError(
+                f"{each} is no plane: give finite a, b, c, d of ax + by + cz + d = 0, a, b, c not all 0, in a list"
+            )
+        found.append(plane)
     return found
-
-
-def _is_one(given: Any) -> bool:
-    """Whether this is an obstacle, and not several."""
-    if open3d_class(given)[0] or not isinstance(given, Iterable):
-        return True
-    try:
-        array = np.asarray(given)
-    except ValueError:  # several of different shapes
-        return False
-    return array.dtype.kind in "iuf" and (len(array) > 0 if array.ndim == 1 else array.shape[1:] == (3,))

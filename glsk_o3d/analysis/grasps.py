@@ -26,14 +26,12 @@ def grasp_candidates(
     gripper: Gripper | float,
     *,
     cloud: Any = None,
-    obstacles: Any = None,
+    obstacles: Any = (),
     cone: tuple[Any, float] | None = None,
     clearance: float | None = None,
     around: int = 8,
     spacing: float | None = None,
-    margin: float = 1.0,
     min_confidence: float = 0.5,
-    up: Any = None,
 ) -> GraspCandidates:
     """Candidates for grasps with parallel jaws, from the axis and the radii of a skeleton's branches.
 
@@ -52,7 +50,7 @@ def grasp_candidates(
         Or its widest opening [cloud's units], with the other sizes in proportion.
     cloud : cloud, optional
         All points of the object; by default the skeleton's. With an empty tuple a finger may go through the object.
-    obstacles : cloud or (4,) array_like, or a sequence of these, optional
+    obstacles : list of clouds and (4,) array_like, optional
         Clouds of other objects, or the vertices of meshes; they may include points of the object. Four numbers are a
         plane as from Open3D's ``segment_plane``, solid behind it as seen from the object.
     cone : (direction, degrees), optional
@@ -61,15 +59,13 @@ def grasp_candidates(
         Opening beyond the width w [cloud's units], half on either side; twice or three times as much where less is not
         free, as in noise. Half of it is also kept all around the gripper. By default a tenth of the widest opening.
     around : int
-        Approach directions at each place, evenly around the axis.
+        Approach directions at each place, evenly around the axis; the first is as near as possible to the direction of
+        the cone, or else to -z.
     spacing : float, optional
-        Distance of the places along the curve [cloud's units]; by default the median radius of the branch.
-    margin : float
-        Least distance along the curve from the ends of the branch, over the radius at that end.
+        Distance of the places along the curve [cloud's units]; by default the median radius of the branch. They keep
+        a radius away from the ends of the branch.
     min_confidence : float
         Least confidence of the skeleton, from 0 to 1. 0 also takes unknown confidences.
-    up : (3,) float array_like, optional
-        The first approach is as near to it as possible. By default against the cone's direction, or else z.
 
     Returns
     -------
@@ -95,27 +91,24 @@ def grasp_candidates(
     >>> from glsk_o3d.samples import tube
     >>> straight = tube(length=1.0, radius=0.1)
     >>> axis = Skeleton(straight.nodes, straight.edges, straight.radii, (), (), (), confidence=[1, 1])
-    >>> table = (0, 0, 1, 0.1)  # z = -0.1: the tube lies on it, and cannot be taken from below, nor from the side
+    >>> table = [(0, 0, 1, 0.1)]  # z = -0.1: the tube lies on it, and cannot be taken from below, nor from the side
     >>> grasp_candidates(axis, 0.4, cloud=straight.points, obstacles=table, clearance=0.05, around=4)
     GraspCandidates(9 at 9 places; not taken: 27 ways in with a finger in an obstacle)
     """
     gripper = gripper if isinstance(gripper, Gripper) else Gripper(gripper)
     clearance = gripper.max_opening / 10 if clearance is None else clearance
-    _check(skeleton, clearance, around, spacing, margin, min_confidence)
-    cone = None if cone is None else checked_cone(cone)
-    above = _direction("up", up) if up is not None else np.array([0.0, 0, 1]) if cone is None else -cone[0]
+    _check(skeleton, clearance, around, spacing, min_confidence)
+    direction, least = (np.array([0.0, 0, -1]), -np.inf) if cone is None else checked_cone(cone)
     points = _object(skeleton, cloud)
     middle = points if len(points) else skeleton.vertices
     if gripper.max_opening > UNLIKELY_OPENING * np.linalg.norm(np.ptp(middle, axis=0)):
         many = f"more than {UNLIKELY_OPENING:g} times as wide as the object is long"
         warnings.warn(f"the gripper opens {many}: are the units the same?", SkeletonWarning, stacklevel=outside())
-    place, branch, width, quality, left_out, looked_at = _fitting(
-        skeleton, gripper, clearance, spacing, margin, min_confidence
-    )
+    place, branch, width, quality, left_out, looked_at = _fitting(skeleton, gripper, clearance, spacing, min_confidence)
     position, axis = place[:, :3], place[:, 3:6]
-    approach = _directions_around(axis, above, around)
+    approach = _directions_around(axis, -direction, around)
     ways = Ways(position, axis, approach, np.cross(axis[:, None], approach))
-    wanted = np.ones(approach.shape[:2], bool) if cone is None else approach @ cone[0] >= cone[1]
+    wanted = approach @ direction >= least
     blocked, opening, depth, seen = free_ways(
         ways, wanted, points, obstacle_list(obstacles), middle, gripper, width, clearance
     )
@@ -144,10 +137,10 @@ def grasp_candidates(
     return candidates
 
 
-def _fitting(skeleton, gripper, clearance, spacing, margin, min_confidence):
+def _fitting(skeleton, gripper, clearance, spacing, min_confidence):
     """Places that fit between the jaws, as of `_places_on`, the branch, width and quality of each, how many do not fit,
     by reason, and how many were looked at."""
-    found = [_places_on(skeleton, path, spacing, margin) for path in skeleton.branches]
+    found = [_places_on(skeleton, path, spacing) for path in skeleton.branches]
     place = np.concatenate([np.empty((0, 9)), *found])
     branch = np.repeat(np.arange(len(found)), list(map(len, found))) if found else np.empty(0, int)
     radius, slope, confidence = place[:, 6:].T
@@ -158,7 +151,6 @@ def _fitting(skeleton, gripper, clearance, spacing, margin, min_confidence):
     reasons = {
         "unknown radius": np.isnan(width),
         "too wide": width + clearance > gripper.max_opening,
-        "too thin": width <= gripper.min_opening,
         "uncertain": ~(confidence >= min_confidence) if min_confidence > 0 else np.zeros(len(width), bool),
     }
     some, left_out = _sorted_out(reasons)
@@ -181,7 +173,7 @@ def _sorted_out(reasons):
     return np.flatnonzero(first == ""), dict(Counter(first[first != ""].tolist()))
 
 
-def _places_on(skeleton, path, spacing, margin):
+def _places_on(skeleton, path, spacing):
     """Places along a branch, (n, 9): position, axis, radius, its slope, confidence."""
     curve, radii = skeleton.vertices[path], skeleton.radii[path]
     along = arc_lengths(curve)
@@ -196,7 +188,7 @@ def _places_on(skeleton, path, spacing, margin):
         count = max(round(length / step), 1)
         at = length / count * np.arange(count)
     else:
-        low, high = margin * np.nan_to_num(radii[0]), length - margin * np.nan_to_num(radii[-1])
+        low, high = np.nan_to_num(radii[0]), length - np.nan_to_num(radii[-1])
         if low > high:
             return np.empty((0, 9))
         count = int((high - low) / step * (1 + 1e-12)) + 1
@@ -210,9 +202,8 @@ def _places_on(skeleton, path, spacing, margin):
     here = sample(at)
     reach = np.where(here[:, 3] > 0, here[:, 3], step)
     if closed:
-        before, behind = at - np.minimum(reach, length / 4), at + np.minimum(reach, length / 4)
-    else:
-        before, behind = np.maximum(at - reach, 0), np.minimum(at + reach, length)
+        reach = np.minimum(reach, length / 4)
+    before, behind = np.clip([at - reach, at + reach], *((-np.inf, np.inf) if closed else (0, length)))
     chord = sample(behind) - sample(before)
     size = np.linalg.norm(chord[:, :3], axis=1, keepdims=True)
     axis = np.divide(chord[:, :3], size, out=np.full((count, 3), np.nan), where=size > 0)
@@ -245,7 +236,7 @@ def _object(skeleton, cloud):
     return points[np.isfinite(points).all(axis=1)]
 
 
-def _check(skeleton, clearance, around, spacing, margin, min_confidence):
+def _check(skeleton, clearance, around, spacing, min_confidence):
     if len(skeleton.vertices) == 0:
         raise InvalidParameterError("the skeleton is empty: there is nothing to grasp")
     if not np.isfinite(skeleton.radii).any():
@@ -253,9 +244,7 @@ def _check(skeleton, clearance, around, spacing, margin, min_confidence):
     if min_confidence != 0 and np.isnan(skeleton.confidence).all():
         raise InvalidParameterError("this skeleton has no confidence, perhaps due to its file: give min_confidence=0")
     check_number("clearance", clearance, low=0)
-    if spacing is not None:
-        check_number("spacing", spacing, low=0, open_low=True)
-    check_number("margin", margin, low=0)
+    check_number("spacing", spacing, "float?", low=0, open_low=True)
     check_number("min_confidence", min_confidence, low=0, high=1)
     check_number("around", around, "int", low=1)
 
@@ -264,18 +253,11 @@ def checked_cone(cone: Any) -> tuple[np.ndarray, float]:
     """Its unit direction, and the least cosine of the angle to it; InvalidParameterError if it is none."""
     try:
         direction, degrees = cone
+        vector = np.asarray(direction, float).reshape(3)
     except (TypeError, ValueError):
-        raise InvalidParameterError(f"cone = {cone!r}: must be a direction and an angle in degrees") from None
+        raise InvalidParameterError(f"cone = {cone!r}: must be three numbers and an angle in degrees") from None
+    if not (np.isfinite(vector).all() and vector.any()):
+        raise InvalidParameterError(f"the direction of cone = {direction!r}: must be finite, and not all 0")
     angle = check_number("the angle of cone", degrees, low=0, high=180)
-    return _direction("the direction of cone", direction), math.cos(math.radians(angle)) - 1e-9  # rounding
-
-
-def _direction(name, given):
-    try:
-        vector = np.asarray(given, float)
-    except (TypeError, ValueError):
-        vector = np.empty(0)
-    if vector.shape != (3,) or not (np.isfinite(vector).all() and vector.any()):
-        raise InvalidParameterError(f"{name} = {given!r}: must be three finite numbers, not all 0")
     vector = vector / np.abs(vector).max()
-    return vector / np.linalg.norm(vector)
+    return vector / np.linalg.norm(vector), math.cos(math.radians(angle)) - 1e-9  # rounding

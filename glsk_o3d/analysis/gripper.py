@@ -6,14 +6,13 @@ import math
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import InvalidParameterError
-from ..interop.atomic import write_atomically, write_json
-from ..interop.packages import import_open3d, require
+from ..interop.atomic import write_json
+from ..interop.packages import import_open3d
 from ..parameters import check_number
 from .rows import Rows
 
@@ -35,8 +34,6 @@ class Gripper:
     ----------
     max_opening : float
         Widest opening between the jaws.
-    min_opening : float
-        Least opening; thinner parts cannot be held.
     finger, palm : (3,) tuples of float
         Extents along the closing direction, along the part, and along the approach: of a finger, from the palm to its
         tip, and of what is behind the fingers.
@@ -46,8 +43,7 @@ class Gripper:
     Raises
     ------
     InvalidParameterError
-        A length is no finite number, not positive, or the jaws close wider than they open, or the palm would be past
-        the axis.
+        A length is no finite number, not positive, or the palm would be past the axis.
 
     Examples
     --------
@@ -56,7 +52,6 @@ class Gripper:
     """
 
     max_opening: float
-    min_opening: float = 0.0
     finger: Any = None
     palm: Any = None
     reach: Any = None
@@ -66,7 +61,6 @@ class Gripper:
         finger = _sides("finger", self.finger, FINGER_PER_OPENING, opening)
         reach = opening * REACH_PER_OPENING if self.reach is None else self.reach
         object.__setattr__(self, "max_opening", opening)
-        object.__setattr__(self, "min_opening", check_number("min_opening", self.min_opening, low=0, high=opening))
         object.__setattr__(self, "finger", finger)
         object.__setattr__(self, "palm", _sides("palm", self.palm, PALM_PER_OPENING, opening))
         object.__setattr__(self, "reach", check_number("reach", reach, low=0, high=finger[2]))
@@ -115,15 +109,6 @@ class GraspCandidates(Rows, row="grasp"):
         Number of examined places along the skeleton.
     left_out : dict of str to int
         Numbers of rejected places, and of rejected approaches to the others, by the first reason.
-
-    Examples
-    --------
-    >>> from glsk_o3d import skeletonize
-    >>> from glsk_o3d.analysis import grasp_candidates
-    >>> from glsk_o3d.samples import tube
-    >>> best = grasp_candidates(skeletonize(tube(1000).points), 0.4)[:3]
-    >>> best.poses.shape, best.seen
-    ((3, 4, 4), array([3, 3, 3]))
     """
 
     position: np.ndarray
@@ -165,10 +150,9 @@ class GraspCandidates(Rows, row="grasp"):
         """Each gripper as a fork of four lines, an ``open3d.geometry.LineSet``.
 
         Two are the fingers, from tip to palm, with the opening between them, one joins them, one is as long as the palm
-        is deep. Colours go from dark blue, the least quality among them, to yellow, the best.
+        is deep.
         """
-        o3d, viridis = import_open3d(), require("matplotlib").colormaps["viridis"]
-        hand = self.gripper
+        o3d, hand = import_open3d(), self.gripper
         side, tip = self.opening[:, None] / 2 * self.closing, self.depth[:, None] * self.approach
         base = tip - hand.finger[2] * self.approach
         fork = [side + tip, side + base, -side + base, -side + tip, base, base - hand.palm[2] * self.approach]
@@ -177,9 +161,6 @@ class GraspCandidates(Rows, row="grasp"):
         drawn = o3d.geometry.LineSet()
         drawn.points = o3d.utility.Vector3dVector(ends)
         drawn.lines = o3d.utility.Vector2iVector(lines.reshape(-1, 2).astype(np.int32))
-        worst, best = self.quality.min(initial=1), self.quality.max(initial=0)
-        shade = (self.quality - worst) / (best - worst) if best > worst else np.ones(len(self))
-        drawn.colors = o3d.utility.Vector3dVector(np.repeat(viridis(shade)[:, :3], 4, axis=0))
         return drawn
 
     def to_json(self, path: str | os.PathLike) -> None:
@@ -198,18 +179,6 @@ class GraspCandidates(Rows, row="grasp"):
             "left_out": self.left_out,
             "grasps": [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)],
         }
-
-    def to_ply(self, path: str | os.PathLike) -> None:
-        """Write the forks of `to_line_set` as a PLY file with coloured edges."""
-        o3d, drawn = import_open3d(), self.to_line_set()
-        if len(self) == 0:
-            raise InvalidParameterError("there is no grasp to draw: write .json or .csv, which may be empty")
-
-        def write(temporary: Path) -> None:
-            if not o3d.io.write_line_set(str(temporary), drawn):
-                raise OSError("Open3D could not write it: is the disk full?")
-
-        write_atomically(path, write)
 
 
 def listed(left_out: Mapping[str, int]) -> str:

@@ -132,41 +132,12 @@ def branch_of_point(skeleton, points, vertex):
     return label
 
 
-def thickness(skeleton: Skeleton, cloud: Any = None) -> np.ndarray:
-    """Local radius at every point over the distance to its eighth nearest point.
-
-    Well above 1 the cloud shows the surface of the part. Below 1 the part is thinner than the point spacing, and its
-    radius is a guess.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-    cloud : cloud, optional
-        As for `segment`; the distances are those of its own points.
-
-    Returns
-    -------
-    (N,) float64 array
-        NaN for points that are not finite, and infinite for those with eight others in their place.
-
-    Raises
-    ------
-    InvalidCloudError, InvalidParameterError
-        There is no cloud, or it has no points; or the skeleton is empty.
-
-    Examples
-    --------
-    >>> from glsk_o3d import skeletonize
-    >>> from glsk_o3d.samples import torus
-    >>> dense, sparse = (thickness(skeletonize(torus(n).points)) for n in (4000, 500))
-    >>> bool(np.median(dense) > 2 * np.median(sparse) > 1)
-    True
-    """
-    return thickness_of_points(skeleton, *vertex_of_cloud(skeleton, cloud))
-
-
 def thickness_of_points(skeleton: Skeleton, points: np.ndarray, vertex: np.ndarray) -> np.ndarray:
-    """The same for points, (N, 3) float array, whose vertices are known, (N,) int array."""
+    """Local radius at every point over the distance to its eighth nearest point, (N,) float array.
+
+    Well above 1 the cloud shows the surface of the part; below 1 it is thinner than the point spacing, and its radius
+    is a guess. `vertex`, (N,) int array, is that of each point, -1 for points that are not finite, which have NaN.
+    """
     some = np.flatnonzero(vertex >= 0)
     found = np.full(len(points), np.nan)
     if len(some):

@@ -40,14 +40,6 @@ class Cylinders(Rows, row="cylinder"):
         The cylinder that it grows from, -1 at the root; row of the branch table, and its order, 0 for the stem.
     confidence : (K,) float array
         Mean confidence along it; 0 without a surface, where the radius is the scatter of the points.
-
-    Examples
-    --------
-    >>> from glsk_o3d import pipelines
-    >>> from glsk_o3d.samples import y_junction
-    >>> table = cylinders(pipelines.tree()(y_junction(2000).points))
-    >>> int(table.order.max()), int((table.parent < 0).sum())
-    (1, 1)
     """
 
     start_point: np.ndarray

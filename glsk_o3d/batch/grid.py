@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InvalidParameterError
-from ..parameters import problem_with, shown
+from ..parameters import check_number
 
 Tile = tuple[int, ...]
 
@@ -87,18 +87,11 @@ class Grid:
 
 def checked_sizes(tiles: Any, overlap: Any) -> tuple[float, float]:
     """The size of tiles and their overlap, by default an eighth of it; InvalidParameterError where they are none."""
-    _check_length("tiles", tiles, None, "a length in the cloud's units")
-    size = float(tiles)
+    size = check_number("tiles", tiles, low=0, open_low=True)
     if overlap is None:
         return size, OVERLAP_SHARE * size
-    _check_length("overlap", overlap, MOST_OVERLAP * size, "at most a quarter of the size of a tile")
-    return size, float(overlap)
-
-
-def _check_length(name: str, value: Any, most: float | None, meant: str) -> None:
-    problem = problem_with(value, {"type": "float", "low": 0, "open_low": True, "high": most, "choices": ()})
-    if problem:
-        raise InvalidParameterError(f"{name} = {shown(value)}: {problem} ({meant})")
+    name = "overlap (at most a quarter of tiles)"
+    return size, check_number(name, overlap, low=0, open_low=True, high=MOST_OVERLAP * size)
 
 
 def tile_name(tile: Tile) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from scipy.cluster.hierarchy import DisjointSet
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
@@ -143,8 +144,7 @@ class Seams(NamedTuple):
 
     joined: int  # pairs that were made one, and ends that were tied to a curve beside them
     unmatched: int  # ends that nobody went on from, since one of two tiles lost what the other has; kept as ends
-    thick: int  # cut ends where the overlap is too small for the part, and ends so near to a cut that it may go on
-    thickest: float  # radius of the thickest part at a seam
+    thickest: float  # radius of the thickest part within reach of a cut through the points
 
     def messages(self, grid: Grid) -> list[str]:
         """What is to be beware of, in sentences."""
@@ -154,11 +154,10 @@ class Seams(NamedTuple):
                 f"{self.unmatched} of {self.joined + self.unmatched} cuts at seams have nothing to meet on the other "
                 "side, and end there: give larger tiles, or more overlap"
             )
-        if self.thick:
-            need = grid.overlap * self.thickest / grid.thickest
+        if self.thickest > grid.thickest:
             messages.append(
-                f"{self.thick} ends at seams are of parts thicker than the overlap of {grid.overlap:g} allows, radius "
-                f"up to {self.thickest:.3g}: give {need:.3g} or more"
+                f"at seams there are parts thicker than the overlap of {grid.overlap:g} allows, radius up to "
+                f"{self.thickest:.3g}: give {grid.overlap * self.thickest / grid.thickest:.3g} or more"
             )
         return messages
 
@@ -194,7 +193,7 @@ def join_tiles(skeletons: Mapping[Tile, Skeleton], grid: Grid) -> tuple[Skeleton
     for tile in sorted(skeletons):
         near = [each for each in brought if max(abs(a - b) for a, b in zip(each, tile, strict=True)) <= 1]
         strands = Strands.of(skeletons[tile]).within(*grid.box(tile, grid.trust))
-        joint.short.append(_fell_short(strands, grid, tile))
+        joint.thickest = max(joint.thickest, _thickest(strands, grid, tile))
         strands = strands.with_pieces(strands.touching(*grid.box(tile, CLAIM_SHARE * grid.trust)))
         theirs = None
         if near:
@@ -203,13 +202,14 @@ def join_tiles(skeletons: Mapping[Tile, Skeleton], grid: Grid) -> tuple[Skeleton
             strands, met = _not_there(strands, theirs, grid, tile, near)
             joint.met.append(met)
         brought[tile] = joint.bring(strands, theirs)
-    return joint.finished(grid)
+    return joint.finished()
 
 
-def _fell_short(strands: Strands, grid: Grid, tile: Tile) -> np.ndarray:
-    """Radii at ends within reach of a cut through the points: it is not known whether the part goes on."""
-    ends = strands.values[(strands.degree <= 1) & ~strands.marks[:, BORDER]]
-    return ends[~inside(ends, *grid.box(tile, grid.overlap), CUT_REACH * ends[:, 3]), 3]
+def _thickest(strands: Strands, grid: Grid, tile: Tile) -> float:
+    """Radius of the thickest part within reach of a cut through the points: its skeleton is not to be trusted."""
+    values = strands.values
+    near = ~inside(values, *grid.box(tile, grid.overlap), CUT_REACH * values[:, 3])
+    return float(np.nanmax(values[near, 3], initial=0))
 
 
 def _not_there(
@@ -263,7 +263,7 @@ class _Joint:
         self._touching: list[tuple[int, int]] = []  # a cut end that found none, and the earlier vertex nearest to it
         self._open: dict[int, np.ndarray] = {}  # the values of cut ends that nobody has gone on from
         self.met = [np.empty((0, 8))]  # ends of the object that others brought: there a cut end has nothing to meet
-        self.short: list[np.ndarray] = []  # radii at ends so near to where points were cut off that they may be none
+        self.thickest = 0.0
 
     def bring(self, strands: Strands, theirs: Samples | None) -> Samples:
         """Add what a tile brings, and join its inner cut ends to what others did; gives it as samples."""
@@ -297,7 +297,7 @@ class _Joint:
             nearest = cKDTree(theirs.places).query(np.array(list(loose.values()))[:, :3])[1]
             self._touching += zip(loose, theirs.vertex[nearest].tolist(), strict=True)
 
-    def finished(self, grid: Grid) -> tuple[Skeleton, Seams]:
+    def finished(self) -> tuple[Skeleton, Seams]:
         """The skeleton that was brought together: merged, tied up, without stubs; and how."""
         values = np.concatenate(self._values)
         same = np.arange(len(values))
@@ -313,13 +313,7 @@ class _Joint:
         alive[gone] = False
         edges = edges[alive[edges].all(axis=1)]
         ends = ends[_unmet(values[ends], np.concatenate(self.met))]
-        radii = np.concatenate([values[np.concatenate([other, touching[:, 0], ends]), 3], *self.short])
-        seams = Seams(
-            joined=len(other) + len(touching) - len(loose),
-            unmatched=len(ends),
-            thick=int((radii > grid.thickest).sum()),
-            thickest=float(np.nanmax(radii, initial=0)),
-        )
+        seams = Seams(len(other) + len(touching) - len(loose), len(ends), self.thickest)
         number, kept, none = np.cumsum(alive) - 1, values[alive], np.empty((0, 3))
         edges = simple_edges(number[edges])
         known = dict(zip(("radii", "confidence", "half_width", "half_thickness"), kept.T[[3, 4, 6, 7]], strict=True))
@@ -329,14 +323,9 @@ class _Joint:
 def _tied(edges: np.ndarray, touching: np.ndarray, alive: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Edges from cut ends to the curves beside them, where they close no loop; and the ends that got none."""
     piece = component_labels(len(alive), edges)
-    new, loose = [], []
-    for one, other in touching.tolist():
-        if piece[one] == piece[other]:
-            loose.append(one)
-        else:
-            new.append((one, other))
-            piece[piece == piece[one]] = piece[other]
-    return simple_edges(np.concatenate([edges, np.array(new, np.int64).reshape(-1, 2)])), np.array(loose, np.int64)
+    connected = DisjointSet(range(len(alive)))
+    ties = np.array([connected.merge(*pair) for pair in piece[touching].tolist()], bool)
+    return simple_edges(np.concatenate([edges, touching[ties]])), touching[~ties, 0]
 
 
 def _stubs(values: np.ndarray, edges: np.ndarray, ends: np.ndarray) -> tuple[list[int], np.ndarray]:

@@ -5,25 +5,24 @@ from __future__ import annotations
 import logging
 import os
 import shutil
+import signal
+import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from contextlib import suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .. import __version__
 from ..errors import BatchError, InvalidParameterError
 from ..interop.atomic import write_json
-from ..interop.interrupts import counted_interrupts
 from ..numerics.cores import cores
 from ..parameters import check_number
-from .ledger import DONE, FAILED, LEDGER_COLUMNS, LOCK_FILE, STALE, Row, locked, refuse_ways_out
-from .plan import RECIPE_FILE, TILES_FOLDER, UP_TO_DATE, Plan, Wanted, planned
-from .splitting import PARTS_FOLDER
-from .tasks import Task, clear, in_one_line, work
+from .ledger import DONE, FAILED, LEDGER_COLUMNS, LOCK_FILE, STARTED, Row, locked, refuse_ways_out
+from .plan import RECIPE_FILE, TILES_FOLDER, UP_TO_DATE, Plan, plan_batch
+from .tasks import Task, failure, in_one_line, work
 from .workers import DaskWorkers, GivenWorkers, LocalWorkers, Workers, died
 
 if TYPE_CHECKING:
@@ -31,7 +30,7 @@ if TYPE_CHECKING:
 
 _POLL_SECONDS = 0.2  # seconds until Ctrl-C is noticed
 CANCELLED = "the work was cancelled, or its scheduler has gone: run the same batch to go on"
-WORKER_DIED = "the worker died with it, twice: out of memory, or a crash in native code"
+WORKER_DIED = "the worker died with it, also alone: out of memory, or a crash in native code"
 _log = logging.getLogger(__name__)
 
 
@@ -82,14 +81,13 @@ def run_batch(
 
     A failed file does not stop the others. Finished clouds are in the ledger, ``ledger.jsonl`` in `out_dir`. The same
     call again skips them and retries failures. The first Ctrl-C starts no more work and waits for running work; the
-    second does not wait. The next call continues in both cases.
+    second does not wait. The next call continues in both cases. A cloud whose worker dies, for example for lack of
+    memory, is tried again at the end, alone.
 
     Parameters
     ----------
-    inputs : path-like, or several
-        Folders, glob patterns, lists of files (``.txt``) and clouds.
-    out_dir : path-like
-        Created if missing.
+    inputs, out_dir, **options
+        As in `plan_batch`; the folder is made.
     workers : int, optional
         Processes on this machine, by default one for each core that this process may use.
     scheduler : str, path-like or distributed.Client, optional
@@ -101,8 +99,6 @@ def run_batch(
         Called with the `Plan` before the work begins.
     on_result : callable, optional
         Called with each row as it enters the ledger.
-    **options
-        As in `plan_batch`.
 
     Returns
     -------
@@ -111,17 +107,11 @@ def run_batch(
     Raises
     ------
     BatchError
-        Another batch writes into `out_dir`, something else is in the place of the parts of a scene, or the workers are
-        lost.
+        Another batch writes into `out_dir`, or the workers are lost.
     KeyboardInterrupt
         After the ledger is complete.
     FileNotFoundError, InvalidParameterError, RecipeError
         As in `plan_batch`.
-
-    Notes
-    -----
-    A worker that dies, for example for lack of memory, is replaced. Its cloud is tried again at the end, alone, and has
-    failed if the worker dies again.
 
     Examples
     --------
@@ -133,22 +123,22 @@ def run_batch(
     if scheduler is not None and (executor is not None or workers is not None):
         raise InvalidParameterError("scheduler: the cluster has its own workers: give neither workers nor an executor")
     check_number("workers", workers, "int?", low=1)
-    wanted, folder = Wanted.of(options), Path(os.path.abspath(out_dir))
+    folder = Path(os.path.abspath(out_dir))
     new = [each for each in (folder, *folder.parents) if not each.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     refuse_ways_out(folder, [LOCK_FILE])
     with locked(folder):
         try:
-            plan = planned(inputs, folder, wanted, write=True)
+            plan = plan_batch(inputs, folder, split=True, **options)
         except BaseException:
-            _remove_new(new)
+            for made in new[-1:]:  # the uppermost
+                shutil.rmtree(made, ignore_errors=True)
             raise
         if on_plan is not None:
             on_plan(plan)
         crew, complete = _hired(plan, workers, scheduler, executor), False
         start = time.perf_counter()
         try:
-            _make_room(plan)
             try:
                 _Run(plan, crew, on_result).work_through()
             finally:
@@ -156,21 +146,10 @@ def run_batch(
             complete = True
         finally:
             crew.close(at_once=not complete)
-        _remove_parts(plan)
     rows = {task.name: plan.ledger.rows[task.name] for task in plan.tasks}
     failed = sum(row["status"] == FAILED for row in rows.values())
     done = len(plan.todo) - failed
     return BatchResult(rows, done, plan.skipped, failed, time.perf_counter() - start, plan.ledger.path)
-
-
-def _remove_new(folders: Sequence[Path]) -> None:
-    """Remove the output folder, and those above it that are new, where it turns out that nothing can be planned."""
-    if folders:
-        shutil.rmtree(folders[0] / PARTS_FOLDER, ignore_errors=True)
-        with suppress(OSError):  # on Windows nobody removes what is open
-            (folders[0] / LOCK_FILE).unlink()
-            for folder in folders:
-                folder.rmdir()
 
 
 def _hired(plan: Plan, workers, scheduler, executor) -> Workers:
@@ -181,39 +160,18 @@ def _hired(plan: Plan, workers, scheduler, executor) -> Workers:
     return LocalWorkers(min(workers or cores(), len(plan.todo)))
 
 
-def _make_room(plan: Plan) -> None:
-    """Mark what is no longer true in the ledger, and make the folders: a worker's own would be where nobody looks."""
-    rows = plan.ledger.rows
-    for task in plan.tasks:
-        name = task.name
-        if task.why == UP_TO_DATE and rows[name]["input"] != task.source:  # the same bytes somewhere else
-            rows[name] = rows.pop(name) | {"input": task.source}
-        elif task.why != UP_TO_DATE and rows.get(name, {}).get("status") == DONE:
-            rows[name]["status"] = STALE
-        if task.needs and task.why != UP_TO_DATE:
-            _forget_tiles(plan, task)
-    plan.ledger.rewrite()
-    write_json(plan.out_dir / RECIPE_FILE, plan.recipe)
-    for folder in {(plan.out_dir / task.name).parent for task in plan.todo}:
-        folder.mkdir(parents=True, exist_ok=True)
-
-
-def _forget_tiles(plan: Plan, task: Task) -> None:
-    """Drop tiles of earlier batches that are none any more, since the size has changed, or the scene."""
-    rows, first = plan.ledger.rows, task.name + TILES_FOLDER
-    for name in [name for name in rows if name.startswith(first) and name not in task.needs]:
-        for output in rows.pop(name)["outputs"]:
-            if output.startswith(first):
-                Path(plan.out_dir, output).unlink(missing_ok=True)
-
-
-def _remove_parts(plan: Plan) -> None:
-    """Remove the files of those parts of scenes that are done."""
-    for task in plan.tasks:
-        if task.origin and plan.ledger.rows[task.name]["status"] == DONE:
-            Path(task.path).unlink(missing_ok=True)
-            with suppress(OSError):  # others are to be done
-                Path(task.path).parent.rmdir()
+@contextmanager
+def _counted_interrupts() -> Iterator[list[int]]:
+    """Count Ctrl-C in a list instead of being torn out of the block by it; outside the main thread none comes."""
+    pressed: list[int] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield pressed
+        return
+    before = signal.signal(signal.SIGINT, lambda number, frame: pressed.append(number))
+    try:
+        yield pressed
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 class _Run:
@@ -221,41 +179,58 @@ class _Run:
 
     def __init__(self, plan: Plan, workers: Workers, on_result: Callable[[Row], object] | None):
         self._plan, self._workers, self._on_result = plan, workers, on_result
+        self._rows = plan.ledger.rows
         self._interrupts: list[int] = []
-        self._is_warned = False
 
     def work_through(self) -> None:
         """Hand out all tasks. Ctrl-C hands out no more and waits for what is in work; the second one does not wait."""
-        todo = self._plan.todo
-        with counted_interrupts() as self._interrupts:  # no line of the ledger is torn
-            self._do([task for task in todo if not task.needs])
-            self._do([task for task in todo if task.needs and self._has_all_tiles(task)])
+        plan = self._plan
+        for task in plan.tasks:
+            if task.why == UP_TO_DATE:
+                self._rows[task.name]["input"] = task.source  # the same bytes may be somewhere else
+        plan.ledger.rewrite()
+        write_json(plan.out_dir / RECIPE_FILE, plan.recipe)
+        for folder in {(plan.out_dir / task.name).parent for task in plan.todo}:
+            folder.mkdir(parents=True, exist_ok=True)  # a worker's own would be where nobody looks
+        with _counted_interrupts() as self._interrupts:  # no line of the ledger is torn
+            self._do([task for task in plan.todo if not task.needs])
+            self._do([task for task in plan.todo if task.needs and self._has_all_tiles(task)])
 
     def _do(self, tasks: list[Task]) -> None:
         """Have tasks done, and those whose workers died once more, each by itself."""
         for task in self._round(tasks):
             for lost in self._round([task]):
-                self._enter(lost, _failed(lost, WORKER_DIED))
+                self._enter(lost, failure(WORKER_DIED))
         if self._interrupts:
             raise KeyboardInterrupt
 
     def _round(self, tasks: list[Task]) -> list[Task]:
         """Have tasks done, side by side; gives those whose workers died."""
-        ready, running, lost = deque(tasks), {}, []
+        ready, running, lost, said = deque(tasks), {}, [], False
         while running or (ready and not self._interrupts):
-            while ready and not self._interrupts and len(running) < self._workers.capacity():
+            while len(running) < self._workers.capacity() and ready and not self._interrupts:
                 task = ready.popleft()
+                self._begin(task)
                 running[self._workers.submit(work, task)] = task
             ended, _ = wait(running, _POLL_SECONDS, FIRST_COMPLETED)
             lost += self._collect({future: running.pop(future) for future in ended})
             if len(self._interrupts) > 1:
                 break
-            if self._interrupts and not self._is_warned:
-                self._is_warned = True
+            if self._interrupts and not said:
+                said = True
                 _log.warning("finishing %d running clouds, starting no more: Ctrl-C again stops at once", len(running))
-            if not ended:
-                self._workers.capacity()  # notices that a scheduler has gone
         return lost
+
+    def _begin(self, task: Task) -> None:
+        """Remove what is there of earlier batches, and say so; but of a cloud on a disk that is not mounted, say."""
+        if not os.path.exists(task.path):
+            return
+        tiles = f"{task.name}{TILES_FOLDER}"  # those of another size, or of another cut of the scene
+        old = [name for name in self._rows if task.needs and name.startswith(tiles) and name not in task.needs]
+        rows = [self._rows.pop(name) for name in (task.name, *old) if name in self._rows]
+        for output in {*task.outputs, *(output for row in rows for output in row["outputs"])}:
+            Path(task.out_dir, output).unlink(missing_ok=True)
+        self._add(task, {"status": STARTED, "outputs": list(task.outputs)})
 
     def _collect(self, ended: dict[Future, Task]) -> list[Task]:
         """Put what came of tasks into the ledger; BatchError, in the end, where there is nobody to work any more."""
@@ -264,43 +239,38 @@ class _Run:
             error = BatchError(CANCELLED) if future.cancelled() else future.exception()
             if isinstance(error, BatchError):
                 gone = error
-            elif error is None:
-                self._enter(task, self._completed(task, future.result()))
             elif died(error):
                 lost.append(task)
             else:
-                self._enter(task, _failed(task, in_one_line(error)))
+                self._enter(task, future.result() if error is None else failure(in_one_line(error)))
         if gone is not None:
             raise gone
         return lost
 
-    def _completed(self, task: Task, row: Row) -> Row:
-        """A worker's row, with what only this process knows."""
-        if row.pop("absent", False) and Path(task.path).exists():
-            row["error"] += f" (on {row['worker']}; there is one here: workers need the same files by the same paths)"
-        if row["status"] == FAILED and "points" not in row and row["outputs"]:  # the scan is away, its results stay
-            before = self._plan.ledger.rows.get(task.name) or row
-            return before | {name: row[name] for name in ("status", "error", "outputs")}
-        return row
-
     def _enter(self, task: Task, row: Row) -> None:
-        """Put a row into the ledger."""
-        row = {"parameters": self._plan.parameters} | row | {"name": task.name, "input": task.source}
-        row = {name: row[name] for name in LEDGER_COLUMNS if name in row}
-        self._plan.ledger.add(row)
+        """Put into the ledger what came of a task."""
+        before = self._rows.get(task.name)
+        if row["status"] == FAILED and before and before["status"] != STARTED:  # the cloud is away, its results stay
+            row = before | {"status": FAILED, "error": row["error"]}
+        else:
+            there = [each for each in task.outputs if row["status"] == DONE or Path(task.out_dir, each).is_file()]
+            row["outputs"] = there
+        row = self._add(task, row)
         if self._on_result is not None:
             self._on_result(row)
 
+    def _add(self, task: Task, row: Row) -> Row:
+        row = {"parameters": self._plan.parameters} | row | {"name": task.name, "input": task.source}
+        row = {name: row[name] for name in LEDGER_COLUMNS if name in row}
+        self._plan.ledger.add(row)
+        return row
+
     def _has_all_tiles(self, task: Task) -> bool:
         """Whether all that a task needs is done; where tiles failed, it has failed, too."""
-        rows = [self._plan.ledger.rows[name] for name in task.needs]
-        failed = [row for row in rows if row["status"] != DONE]
-        if failed:
-            why = f"{len(failed)} of {len(rows)} tiles failed, {failed[0]['name']} since {failed[0]['error']}"
-            self._enter(task, _failed(task, f"{why}: the same batch tries them again"))
-        return not failed
-
-
-def _failed(task: Task, error: str) -> Row:
-    clear(task)
-    return {"status": FAILED, "error": error, "outputs": [], "version": __version__}
+        rows = [self._rows[name] for name in task.needs]
+        undone = [row for row in rows if row["status"] != DONE]
+        if undone:
+            why = f"{len(undone)} of {len(rows)} tiles failed, {undone[0]['name']} since {undone[0]['error']}"
+            self._begin(task)
+            self._enter(task, failure(f"{why}: the same batch tries them again"))
+        return not undone

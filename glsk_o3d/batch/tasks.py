@@ -6,8 +6,7 @@ import os
 import socket
 import threading
 import time
-import traceback
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
@@ -29,10 +28,9 @@ from ..viewing.preview import save_preview
 from .grid import tile_of
 from .joining import join_tiles
 from .ledger import DONE, FAILED, Row, file_hash
-from .splitting import Split
+from .splitting import read_split
 
 TILE_ENDING = ".npz"  # of the skeletons of tiles: it keeps all to the last bit
-_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -47,61 +45,42 @@ class Task:
     out_dir: str = ""
     recipe: dict[str, Any] = field(default_factory=dict)
     cut_loops: bool = False
-    where: str = ""  # the points to take; empty for all
-    stale: tuple[str, ...] = ()  # outputs of an earlier batch, which are no longer true
-    foreign: tuple[str, ...] = ()  # outputs that no ledger knows: replaced perhaps, never removed
-    origin: str = ""  # the file of which `path` holds a part
-    needs: tuple[str, ...] = ()  # names of the tiles from whose skeletons, their only outputs, this one is joined
-    split: Split | None = None  # how the scene was taken apart, but for the list of its parts
+    where: str | None = None  # the points to take
+    is_tile: bool = False
+    needs: tuple[str, ...] = ()  # names of the tiles that are joined; `path` then holds what is known of them
 
 
 def work(task: Task) -> Row:
-    """Skeletonise a cloud and write the results; gives what the ledger is to say, whatever goes wrong.
-
-    Of what failed it also says in ``absent`` whether this machine lacks the cloud or the output folder.
-    """
+    """Skeletonise a cloud and write the results; gives what the ledger is to say, whatever goes wrong."""
     start = time.perf_counter()
-    row: Row = {"error": "", "outputs": [], "version": __version__}
-    row["worker"] = f"{socket.gethostname()}, process {os.getpid()}"
+    row: Row = {"status": DONE, "error": "", "worker": f"{socket.gethostname()}, process {os.getpid()}"}
     with _logged_warnings() as heard:
         try:
             with suppress(OSError):  # what it is shows when it is read
-                row["input_hash"] = file_hash(task.path) if task.split is None else task.split.input_hash
+                row["input_hash"] = file_hash(task.path)
             _skeletonize(task, row, heard)
-            row["status"] = DONE
         except Exception as error:  # whatever it is, the other clouds are to be done
-            row |= {"status": FAILED, "error": in_one_line(error).removeprefix(f"{task.path}: ")}
-            row["absent"] = not (os.path.exists(task.path) and os.path.isdir(task.out_dir))
-            if "points" not in row and not os.path.exists(task.path):  # on a disk that is not mounted, say
-                row["outputs"] = [each for each in task.stale if Path(task.out_dir, each).is_file()]
-        clear(task, row["outputs"])
+            row |= failure(in_one_line(error).removeprefix(f"{task.path}: "))
     messages = list(dict.fromkeys(heard))
     row |= {"seconds": round(time.perf_counter() - start, 4), "warnings": len(messages), "messages": messages}
-    return {**row, "finished": datetime.now(timezone.utc).isoformat(timespec="seconds")}
+    return {**row, "version": __version__, "finished": datetime.now(timezone.utc).isoformat(timespec="seconds")}
 
 
-def clear(task: Task, written: Iterable[str] = ()) -> None:
-    """Remove what is there of earlier batches and of a task that broke off, but what was `written`; log failures.
-
-    Only afterwards, since a cluster may do a task once more, and end while it does.
-    """
-    for path in sorted({*task.stale, *task.outputs}.difference(task.foreign, written)):
-        try:
-            Path(task.out_dir, path).unlink(missing_ok=True)
-        except OSError as error:
-            _log.warning("an old result could not be removed: %s", in_one_line(error))
+def failure(error: str) -> Row:
+    """What the ledger is to say of a cloud that failed, and why."""
+    return {"status": FAILED, "error": error, "version": __version__}
 
 
 def _skeletonize(task: Task, row: Row, messages: list[str]) -> None:
     row |= {"seams": None, "unmatched": None}
     if task.needs:
         skeleton = _joined(task, row)
-    elif task.split and task.split.grid:
+    elif task.is_tile:
         skeleton = _of_tile(task)
     else:
-        pipeline, where = from_recipe(task.recipe), task.where or None
-        sample = sample_for(pipeline, task.path, where)  # of many points
-        skeleton = pipeline(read_cloud(task.path, where=where) if sample is None else sample)
+        pipeline = from_recipe(task.recipe)
+        sample = sample_for(pipeline, task.path, task.where)  # of many points
+        skeleton = pipeline(read_cloud(task.path, where=task.where) if sample is None else sample)
     messages += skeleton.report.warnings
     facts = summary(skeleton, 0.0).items()
     row |= {name: None if isinstance(value, float) and not math.isfinite(value) else value for name, value in facts}
@@ -111,7 +90,6 @@ def _skeletonize(task: Task, row: Row, messages: list[str]) -> None:
             save_preview(skeleton, path, title=os.path.basename(task.source))
         else:
             save_skeleton(skeleton, path, cut_loops=task.cut_loops)
-        row["outputs"].append(output)
 
 
 def _of_tile(task: Task) -> Skeleton:
@@ -128,8 +106,7 @@ def _of_tile(task: Task) -> Skeleton:
 
 def _joined(task: Task, row: Row) -> Skeleton:
     """The skeleton of a scene, from those of its tiles; the row gets how they met."""
-    split, files = task.split, [Path(task.out_dir, f"{name}{TILE_ENDING}") for name in task.needs]
-    assert split is not None
+    split, files = read_split(Path(task.path)), [Path(task.out_dir, f"{name}{TILE_ENDING}") for name in task.needs]
     assert split.grid is not None
     skeletons = {tile_of(file.stem): read_skeleton(file) for file in files}
     skeleton, seams = join_tiles(skeletons, split.grid)
@@ -145,14 +122,9 @@ def _joined(task: Task, row: Row) -> Skeleton:
 
 
 def in_one_line(error: BaseException) -> str:
-    """An error in one line; of a mistake in the code also the place."""
-    if isinstance(error, MemoryError):
-        return f"out of memory {error}".strip()
-    if isinstance(error, GlskError | OSError):
-        return in_words(error)
-    place = traceback.extract_tb(error.__traceback__)
-    where = f" ({os.path.basename(place[-1].filename)}, line {place[-1].lineno})" if place else ""
-    return " ".join(f"{type(error).__name__}: {error}{where}".split())
+    """An error in one line, with its name if it is none that users can mend."""
+    known = in_words(error)
+    return known if isinstance(error, GlskError | OSError) else f"{type(error).__name__}: {known}"
 
 
 @contextmanager

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,22 +16,17 @@ from .outputs import tell
 if TYPE_CHECKING:
     from ..batch import BatchResult, Plan
 
-SHOWN_NAMES = 5  # fitted: that fit on a line
-
 
 def batch(
     inputs: Annotated[
         list[str],
-        argument(
-            "DIR|GLOB|LIST|SCAN...", "Folders, glob patterns in quotes, lists (.txt, a path per line), and scans."
-        ),
+        argument("DIR|LIST|SCAN...", "Folders, lists (.txt, a path per line), and scans."),
     ],
     output: Annotated[Path, output_option("FOLDER", "For the skeletons and the ledger; made if needed.")],
     formats: Annotated[str, option("NAMES", f"With commas: {', '.join(SKELETON_ENDINGS)}.", "--format")] = "ply",
     preview: Annotated[bool, Option("--preview", help="Also draw each cloud with its skeleton (png).")] = False,
     recursive: Annotated[bool, Option("--recursive", "-r", help="Take also the sub-folders of folders.")] = False,
     pipeline: options.PipelineName = "default",
-    recipe: options.Recipe = None,
     settings: options.Settings = None,
     drop_invalid: options.DropInvalid = False,
     cut_loops: options.CutLoops = False,
@@ -60,7 +55,7 @@ def batch(
     from .overrides import choose
 
     what: dict[str, Any] = dict(
-        pipeline=choose(pipeline, recipe, settings or [], drop_invalid),
+        pipeline=choose(pipeline, settings, drop_invalid),
         formats=[word.strip() for word in formats.split(",") if word.strip()],
         preview=preview,
         cut_loops=cut_loops,
@@ -74,9 +69,9 @@ def batch(
     if dry_run:
         _tell_plan(plan_batch(inputs, output, **what))
         return
-    with progress(not flags.quiet, remaining=True) as update:
-        watch = _Watch(update)
+    with progress(remaining=True) as update:
         update("looking for what is done")
+        watch = _Watch(update)
         what |= dict(workers=workers, scheduler=scheduler, on_plan=watch.begin, on_result=watch.step)
         result = run_batch(inputs, output, **what)
     _tell_result(result, watch.left_out)
@@ -86,24 +81,17 @@ class _Watch:
     """Shows how far a batch is; says what fails as soon as it does."""
 
     def __init__(self, update):
-        self._update = update
-        self._done = self._failed = 0
+        self._update, self._done = update, 0
 
     def begin(self, plan: Plan) -> None:
-        self._start, self._total, self.left_out = time.perf_counter(), len(plan.todo), plan.left_out
-        if not flags.quiet:
-            _say_left_out(plan)
-        self._update("starting", 0, self._total)
+        self._total, self.left_out = len(plan.todo), plan.left_out
+        _say_left_out(plan)
 
     def step(self, row: dict[str, Any]) -> None:
-        failed = row["status"] == "failed"
-        self._done, self._failed = self._done + 1, self._failed + failed
-        rate = self._done / (time.perf_counter() - self._start)
-        self._update(f"{rate:.3g} scans/s" + f", {self._failed} failed" * (self._failed > 0), self._done, self._total)
-        if failed and not flags.quiet:
+        self._done += 1
+        self._update(f"done: {row['input']}", self._done, self._total)
+        if row["status"] == "failed" and not flags.quiet:
             say("warning", f"{row['input']}: {row['error']}")
-        elif flags.verbose:
-            say("info", f"{row['input']}: {row['vertices']} vertices in {row['seconds']:.2f} s")
 
 
 def _tell_result(result: BatchResult, left_out: dict[str, str]) -> None:
@@ -111,16 +99,15 @@ def _tell_result(result: BatchResult, left_out: dict[str, str]) -> None:
     from ..errors import BatchError
 
     rows = result.rows.values()
-    facts = {name: getattr(result, name) for name in ("done", "skipped", "failed")}
+    failed = [{"input": row["input"], "error": row["error"]} for row in rows if row["status"] == "failed"]
+    facts: dict[str, Any] = {name: getattr(result, name) for name in ("done", "skipped", "failed")}
     facts |= {"seconds": round(result.seconds, 3), "clouds_per_second": round(result.rate, 3)}
-    facts["ledger"] = str(result.ledger)
-    failed = [row for row in rows if row["status"] == "failed"]
-    failures = [{"input": row["input"], "error": row["error"]} for row in failed]
-    warned = sum(bool(row.get("warnings")) for row in rows)
-    shown = {**facts, "with_warnings": f"{warned}, see ledger.csv" if warned else None}
-    tell({**facts, "failures": failures, "left_out": left_out}, lambda: print_rows(shown))
+    facts |= {"with_warnings": sum(bool(row.get("warnings")) for row in rows)}
+    facts |= {"ledger": str(result.ledger)}
+    tell({**facts, "failures": failed, "left_out": left_out}, lambda: print_rows(facts))
     if failed:
-        raise BatchError(f"{len(failed)} of {len(rows)} scans failed: {result.ledger.with_suffix('.csv')} says why")
+        table = result.ledger.with_suffix(".csv")
+        raise BatchError(f"{len(failed)} of {len(rows)} scans failed: {table} says why")
 
 
 def _tell_plan(plan: Plan) -> None:
@@ -136,8 +123,7 @@ def _tell_plan(plan: Plan) -> None:
 
 
 def _say_left_out(plan: Plan) -> None:
-    """Say which files are not taken, and why: the reason once, with the names of the first files."""
-    for reason in dict.fromkeys(plan.left_out.values()):
-        files = sorted(Path(path).name for path, why in plan.left_out.items() if why == reason)
-        named = ", ".join(files[:SHOWN_NAMES]) + ", ..." * (len(files) > SHOWN_NAMES)
-        say("info", f"left out {len(files)}: {reason} ({named})")
+    """Say how many files are not taken, and why; their names are in JSON."""
+    for reason, n in Counter(plan.left_out.values()).items():
+        if not flags.quiet:
+            say("info", f"left out {n}: {reason}")

@@ -55,14 +55,14 @@ def console(*, stderr: bool = False) -> Any:
 
 
 @contextmanager
-def progress(shown: bool, *, remaining: bool = False) -> Iterator[Callable[..., None]]:
-    """A line with a bar on stderr that goes away in the end, if stderr is a terminal.
+def progress(*, remaining: bool = False) -> Iterator[Callable[..., None]]:
+    """A line with a bar on stderr that goes away in the end, if stderr is a terminal and nothing asked for quiet.
 
     Gives ``update(text, done=None, total=None)``; without numbers the bar only moves. With `remaining` it also says how
-    many are done of how many, and how long the others will take.
+    many are done of how many, and how long the others will take; else the log, where it is shown, is enough.
     """
     out = console(stderr=True)
-    if not (shown and out.file.isatty()):
+    if flags.quiet or (flags.verbose and not remaining) or not out.file.isatty():
         yield lambda text, done=None, total=None: None
         return
     from rich import progress as bar
@@ -80,12 +80,7 @@ def progress(shown: bool, *, remaining: bool = False) -> Iterator[Callable[..., 
 
 
 def print_table(
-    rows: Iterable[Sequence[str]],
-    heads: Sequence[str] = (),
-    *,
-    left: Collection[int] = (),
-    wrap: bool = False,
-    err: bool = False,
+    rows: Iterable[Sequence[str]], heads: Sequence[str] = (), *, left: Collection[int] = (), wrap: bool = False
 ) -> None:
     """Print rows of words below each other, those in the columns `left` to the left, all so where there are no `heads`.
 
@@ -95,13 +90,11 @@ def print_table(
     from rich.table import Table
 
     rows = list(rows)
-    table = Table.grid(padding=(0, 2, 0, 0))
-    if heads:
-        table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0), header_style="")
-    width = len(heads or next(iter(rows), ()))
-    for i in range(width):
-        to_left = not heads or i in left
-        table.add_column(heads[i] if heads else "", justify="left" if to_left else "right", no_wrap=i < width - 1)
+    named = heads or [""] * len(next(iter(rows), ()))
+    style: Any = dict(box=SIMPLE_HEAD if heads else None, show_header=bool(heads), pad_edge=False, header_style="")
+    table = Table(**style, padding=(0, 1 if heads else 2, 0, 0))
+    for i, head in enumerate(named):
+        table.add_column(head, justify="right" if heads and i not in left else "left", no_wrap=i < len(named) - 1)
     for row in rows:
         table.add_row(*row)
     out = console()
@@ -109,7 +102,7 @@ def print_table(
         out.width = UNBROKEN
     with out.capture() as captured:
         out.print(table)
-    echo("\n".join(line.rstrip() for line in captured.get().removesuffix("\n").split("\n")), err=err)
+    echo("\n".join(line.rstrip() for line in captured.get().removesuffix("\n").split("\n")))
 
 
 def print_rows(rows: Mapping[str, Any], *, title: str = "") -> None:
@@ -130,9 +123,10 @@ def value_in_words(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
-        return f"{value:.6g}"
+        return "not known" if math.isnan(value) else f"{value:.6g}"
     if isinstance(value, dict):
-        return ", ".join(f"{name.replace('_', ' ')} {value_in_words(each)}" for name, each in value.items())
+        known = {name.replace("_", " "): each for name, each in value.items() if each is not None}
+        return ", ".join(f"{name} {value_in_words(each)}" for name, each in known.items())
     if isinstance(value, list | tuple):
         return ("\n" if isinstance(value, list) else " ").join(map(value_in_words, value))
     return str(value)
@@ -140,7 +134,7 @@ def value_in_words(value: Any) -> str:
 
 def print_json(data: Any) -> None:
     """Print JSON on stdout; numbers that are not finite become null."""
-    typer.echo(json.dumps(_finite(data), indent=2, allow_nan=False))
+    typer.echo(json.dumps(_finite(data), indent=2, allow_nan=False, default=str))
 
 
 def _finite(data):

@@ -35,10 +35,10 @@ def filters(
     def words() -> None:
         for facts in filter_facts:
             flow = f"{facts['consumes']} -> {facts['produces']}" if facts["consumes"] else facts["kind"]
-            _print_facts(facts, flow, map(_parameter_row, facts["parameters"]), full=name is not None)
+            _print_facts(facts, flow, map(_parameter_row, facts["parameters"]), name is not None)
         for facts in pipeline_facts:
             stages = (("  |" if i else "", stage) for i, stage in enumerate(facts["stages"]))
-            _print_facts(facts, "pipeline", stages, full=name is not None)
+            _print_facts(facts, "pipeline", stages, name is not None)
 
     tell({"filters": filter_facts, "pipelines": pipeline_facts}, words)
 
@@ -59,7 +59,7 @@ def _filter_facts(cls: type[Parameters]) -> dict[str, Any]:
         **flow,
         "doc": _prose(cls),
         "parameters": [
-            {"name": field.name, **field.metadata, "default": _plain(field.default), "limits": limits(field.metadata)}
+            {"name": field.name, **field.metadata, "default": _default(field), "limits": limits(field.metadata)}
             for field in fields
         ],
     }
@@ -81,29 +81,26 @@ def limits(metadata) -> str:
     return ", ".join(words)
 
 
+def _default(field: dataclasses.Field[Any]) -> Any:
+    return repr(field.default) if dataclasses.is_dataclass(field.default) else field.default
+
+
 def _plugin(thing) -> str | None:
     """The package that a filter or pipeline is from, None for this one."""
     package = getattr(thing, "__module__", "").partition(".")[0]
     return None if package == __package__.partition(".")[0] else package
 
 
-def _plain(value):
-    return value if isinstance(value, bool | int | float | str | None) else repr(value)
-
-
 def _prose(documented) -> str:
     """The docstring up to its first section, a line per paragraph, with the markup of formulas and code taken off."""
-    text = inspect.cleandoc(documented.__doc__ or "")
-    text = re.split(r"\n\n\w[\w ]*\n-{3,}\n", text, maxsplit=1)[0]
-    text = re.sub(r":math:`([^`]*)`|``([^`]*)``|`([^`]*)`", lambda m: m[1] or m[2] or m[3], text)
-    text = re.sub(r"\\(\w+)", r"\1", text)
-    return re.sub(r"(?<!\n)\n(?!\n)", " ", text)
+    text = re.split(r"\n\n\w[\w ]*\n-{3,}\n", inspect.getdoc(documented) or "", maxsplit=1)[0]
+    text = re.sub(r"(?<!\n)\n(?!\n)", " ", text)
+    return re.sub(r":math:`([^`]*)`|``([^`]*)``|`([^`]*)`", lambda m: m[1] or m[2] or m[3], text)
 
 
 def _print_facts(facts: dict[str, Any], kind: str, rows, full: bool) -> None:
-    origin = f", from {facts['plugin']}" if facts["plugin"] else ""
-    heading(f"{facts['name']}  {kind}{origin}")
-    print_table([[facts["doc"] + "\n" if full else facts["doc"].partition("\n\n")[0]]], wrap=True)
+    heading(f"{facts['name']}  {kind}" + f", from {facts['plugin']}" * bool(facts["plugin"]))
+    print_table([[facts["doc"] if full else facts["doc"].partition("\n\n")[0]]], wrap=True)
     print_table(rows, wrap=True)
     echo()
 

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 from .console import echo, print_table
 from .options import argument, option, output_option
-from .outputs import check_outputs, tell
+from .outputs import Output, check_outputs, tell, write_each
 from .reporting import WrongUsage
 
 if TYPE_CHECKING:
     from ..analysis import GraspCandidates
 
-GRASP_ENDINGS = (".json", ".csv", ".ply")
-HEADS = ("x", "y", "z", "approach x", "approach y", "approach z", "opening", "quality", "seen", "branch")
+GRASP_ENDINGS = (".json", ".csv")
 
 
 def grasps(
@@ -24,20 +23,9 @@ def grasps(
     scene: Annotated[list[Path] | None, option("FILE", "Points of what else is there; may be repeated.")] = None,
     plane: Annotated[list[str] | None, option("A,B,C,D", "A table, ax + by + cz + d = 0; may be repeated.")] = None,
     cone: Annotated[str | None, option("DIRECTION,DEGREES", "Come in no farther from this, such as -z,60.")] = None,
-    up: Annotated[str | None, option("DIRECTION", "What is up: z, or x,y,z. Else against the cone, or z.")] = None,
-    clearance: Annotated[
-        float | None, option("LENGTH", "Half on each side; by default a tenth of the opening.")
-    ] = None,
-    finger: Annotated[str | None, option("THICKNESS,WIDTH,LENGTH", "By default as the Franka Hand has it.")] = None,
-    palm: Annotated[str | None, option("EXTENT,WIDTH,DEPTH", "Of the hand behind the fingers; else the same.")] = None,
-    around: Annotated[int, option("N", "Directions around each place.", min=1)] = 8,
-    spacing: Annotated[float | None, option("LENGTH", "Of the places; by default the radius of the branch.")] = None,
-    margin: Annotated[float, option("RADII", "From the ends of a branch.")] = 1.0,
     min_confidence: Annotated[float, option("SHARE", "Of the skeleton, from 0 to 1.")] = 0.5,
     count: Annotated[int, option("N", "How many to show and write, of each place its best first.", "-n", min=1)] = 20,
-    output: Annotated[
-        list[Path] | None, output_option("FILE", "json, csv, or ply to look at; may be repeated.")
-    ] = None,
+    output: Annotated[list[Path] | None, output_option("FILE", "json or csv; may be repeated.")] = None,
 ) -> None:
     """Find where a gripper with two jaws can take an object.
 
@@ -46,34 +34,25 @@ def grasps(
     plane. Space that was not scanned counts as free.
     """
     from .. import read_cloud, read_skeleton
-    from ..analysis import Gripper, grasp_candidates
+    from ..analysis import grasp_candidates
 
-    files = [(path, GRASP_ENDINGS, "grasps are JSON, CSV or PLY") for path in output or []]
-    check_outputs(files, skeleton, cloud, *(scene or []))
-    planes = [_numbers("--plane", text, 4) for text in plane or []]
-    gripper = Gripper(
-        opening,
-        finger=None if finger is None else _numbers("--finger", finger, 3),
-        palm=None if palm is None else _numbers("--palm", palm, 3),
-    )
+    outputs = [Output(path, GRASP_ENDINGS, "grasps are JSON or CSV", _save) for path in output or []]
+    check_outputs(outputs, skeleton, cloud, *(scene or []))
     found = grasp_candidates(
         read_skeleton(skeleton),
-        gripper,
+        opening,
         cloud=None if cloud is None else read_cloud(cloud),
-        obstacles=[*planes, *map(read_cloud, scene or [])],
-        clearance=clearance,
-        around=around,
-        spacing=spacing,
-        margin=margin,
+        obstacles=[*(_numbers("--plane", text, 4) for text in plane or []), *map(read_cloud, scene or [])],
         min_confidence=min_confidence,
         cone=None if cone is None else _cone(cone),
-        up=None if up is None else _direction("--up", up),
     )
     best = found[:count]
-    for path in output or []:
-        {".json": best.to_json, ".csv": best.to_csv, ".ply": best.to_ply}[path.suffix.lower()](path)
     facts = {"skeleton": str(skeleton), "found": len(found), **best.as_dict()}
-    tell(facts, lambda: _print(best, len(found)), output or [])
+    tell(facts, lambda: _print(best, len(found)), write_each(outputs, best))
+
+
+def _save(best: GraspCandidates, path: Path) -> None:
+    {".json": best.to_json, ".csv": best.to_csv}[path.suffix.lower()](path)
 
 
 def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
@@ -86,32 +65,23 @@ def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
     return values
 
 
-def _direction(option: str, text: str) -> tuple[float, ...]:
-    """An axis with or without a minus, or three numbers."""
-    name = text.strip().lower()
-    if name.removeprefix("-") in ("x", "y", "z"):
-        return tuple((-1.0 if name[0] == "-" else 1.0) * (axis == name[-1]) for axis in "xyz")
-    return _numbers(option, text, 3)
-
-
 def _cone(text: str) -> tuple[tuple[float, ...], float]:
-    direction, comma, degrees = text.rpartition(",")
-    if not comma:
-        raise WrongUsage(f"--cone {text}: write a direction and degrees, such as -z,60")
-    return _direction("--cone", direction), _numbers("--cone", degrees, 1)[0]
+    """A direction, which is an axis with or without a minus or three numbers, and degrees."""
+    direction, _, degrees = text.rpartition(",")
+    name = direction.strip().lower()
+    if name.removeprefix("-") in ("x", "y", "z"):
+        direction = ",".join(str((-1 if name[0] == "-" else 1) * (axis == name[-1])) for axis in "xyz")
+    *way, angle = _numbers("--cone", f"{direction},{degrees}", 4)
+    return tuple(way), angle
 
 
 def _print(best: GraspCandidates, found: int) -> None:
-    from ..decisions import coordinates
-
     echo(f"{found} grasps at {best.places} places")
     for reason, times in best.left_out.items():
         limit = " (confidence below --min-confidence)" if reason == "uncertain" else ""
         echo(f"left out: {times} {reason}{limit}")
-    columns = (best.position, best.approach, best.opening, best.quality, best.seen, best.branch)
-    rows = []
-    for place, way, opening, quality, seen, branch in zip(*columns, strict=True):
-        numbers = [f"{opening:.4g}", f"{quality:.2f}", str(seen), str(branch)]
-        rows.append([*coordinates(place).split(", "), *(f"{value:.2f}" for value in way), *numbers])
-    if rows:
-        print_table(rows, HEADS)
+    columns = [f"{name}_{axis}" for name in ("position", "approach") for axis in "xyz"]
+    columns += ["opening", "quality", "seen", "branch"]
+    if found:
+        heads = [column.removeprefix("position_").replace("_", " ") for column in columns]
+        print_table([[f"{round(grasp[column], 9):.4g}" for column in columns] for grasp in best], heads)

@@ -22,7 +22,7 @@ from .info import info
 from .measures import branches, tree
 from .reporting import as_command, reporting
 from .run import run
-from .skeletonize import demo, rerun, skeletonize
+from .skeletonize import demo, skeletonize
 from .view import view
 
 EPILOG = (
@@ -39,13 +39,12 @@ app = typer.Typer(
     epilog=EPILOG,
 )
 ANALYSES = (evaluate, crosscheck, branches, tree, grasps)
-WITHOUT_JSON = (convert, rig, view, demo)
 
 
 def add_plugged(app: typer.Typer) -> None:
     """Add the commands of other distributions; the benchmark says how to get it where it is not there."""
     problems: list[str] = []
-    found = {entry.name: entry for _, entry in entry_points(COMMAND_GROUP, problems)}
+    found = {entry.name: entry for entry in entry_points(COMMAND_GROUP, problems)}
     for name, entry in sorted(found.items()):
         try:
             plugged = entry.load()
@@ -83,9 +82,8 @@ def main(
     """Curve skeletons from point clouds."""
 
 
-for function in (skeletonize, batch, run, rerun, *ANALYSES, edit, convert, rig, view, demo, filters, info):
-    command = as_command(function, with_json=function not in WITHOUT_JSON)
-    app.command(epilog=EPILOG if function is skeletonize else None)(command)
+for function in (skeletonize, batch, run, *ANALYSES, edit, convert, rig, view, demo, filters, info):
+    app.command(epilog=EPILOG if function is skeletonize else None)(as_command(function))
 add_plugged(app)
 
 if __name__ == "__main__":

@@ -5,8 +5,6 @@ from typing import Annotated, Any
 
 from typer import Argument, Option
 
-from .completion import OWN_PIPELINES, complete_pipelines, complete_settings
-
 SKELETON_ENDINGS = ["ply", "obj", "json", "npz", "swc", "graphml", "cgal", "vtp", "glb", "urdf"]
 """Endings of skeletons; written out, since the table of formats is slow to import."""
 TREE_ENDINGS = ["swc", "glb", "urdf"]
@@ -50,13 +48,8 @@ DropInvalid = Annotated[bool, Option("--drop-invalid", help="Drop points with Na
 
 PipelineName = Annotated[
     str,
-    option(
-        "NAME",
-        f"One of {', '.join(OWN_PIPELINES)}, or a plugin's; see 'glsk filters'.",
-        autocompletion=complete_pipelines,
-    ),
+    option("NAME|FILE", "default, tree, wen2024, cao2010, a plugin's, or a recipe: json or toml, or a result in json."),
 ]
-Recipe = Annotated[Path | None, option("FILE", "Run a pipeline from a json or toml file instead of a named one.")]
 Settings = Annotated[
     list[str] | None,
     option(
@@ -64,12 +57,11 @@ Settings = Annotated[
         "Change a parameter, such as Connector.radius=2%, or k=24 where only one filter has a k; see 'glsk filters'; "
         "may be repeated.",
         "--set",
-        autocompletion=complete_settings,
     ),
 ]
 Root = Annotated[Any, root_option("Where the skeleton grows from, by default from where its file says")]
 
-Output = Annotated[
+SkeletonOutput = Annotated[
     list[Path] | None,
     output_option(
         "FILE", f"Where to write the skeleton: {', '.join(SKELETON_ENDINGS)}, by the ending; may be repeated."

@@ -2,30 +2,21 @@
 
 from collections.abc import Iterable
 from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
+from ..driver import as_pipeline
 from ..errors import InvalidParameterError, did_you_mean
 from ..parameters import Parameters
 from ..pipeline import Pipeline
-from ..recipes import load_recipe
-from ..recipes.catalogue import catalogue, named_pipeline, serves
+from ..recipes.catalogue import catalogue, serves
 from ..tracer import Tracer
-from .reporting import WrongUsage
 
 _BOOLS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
 
 
-def choose(
-    pipeline: str, recipe: Path | None = None, settings: Iterable[str] = (), drop_invalid: bool = False
-) -> Pipeline:
+def choose(pipeline: str, settings: Iterable[str] | None = (), drop_invalid: bool = False) -> Pipeline:
     """The pipeline, from a cloud to a skeleton, that the options of a command ask for."""
-    if recipe is not None and pipeline != "default":
-        raise WrongUsage(f"--recipe {recipe} and --pipeline {pipeline}: give one of them")
-    base = named_pipeline(pipeline) if recipe is None else load_recipe(recipe)
-    chosen = override(base, [*settings, *["drop_invalid=true"] * drop_invalid])
-    chosen.check_complete()
-    return chosen
+    return override(as_pipeline(pipeline), [*(settings or ()), *["drop_invalid=true"] * drop_invalid])
 
 
 def grown_from(root: str, pipeline: Pipeline) -> Pipeline:
@@ -36,20 +27,16 @@ def grown_from(root: str, pipeline: Pipeline) -> Pipeline:
 
 
 def override(pipeline: Pipeline, settings: Iterable[str]) -> Pipeline:
-    """A pipeline with parameters replaced, each wherever its filter occurs, also inside another filter.
+    """A pipeline with parameters replaced, each wherever its filter occurs, also inside another filter; in their order.
 
     A setting is ``Filter.parameter=value``, or ``parameter=value`` where only one part of the pipeline has a parameter
     of that name. Values are written as in Python or as plain words: ``16``, ``1e4``, ``2%``, ``true``, ``none``,
     ``index``; reducers and rules by their names (``Contractor.stop=RingSizeRatio``). InvalidParameterError where a
     setting is malformed, or its filter, parameter or value is wrong.
     """
-    settings, ready = list(settings), pipeline
-    for setting in settings:  # reducers and rules first: other settings may change what is put in
-        with suppress(InvalidParameterError):  # whatever is wrong is said below
-            option, value = _parse(setting, ready)
-            if isinstance(value, Parameters):
-                ready = ready.with_options({option: value})
-    return pipeline.with_options(dict(_parse(setting, ready) for setting in settings))
+    for setting in settings:
+        pipeline = pipeline.with_options(dict([_parse(setting, pipeline)]))
+    return pipeline
 
 
 def _parse(setting: str, pipeline: Pipeline) -> tuple[str, Any]:

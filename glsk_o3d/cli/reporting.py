@@ -13,8 +13,6 @@ from pathlib import Path
 import typer
 
 from ..errors import GlskError, InvalidCloudError, InvalidParameterError, PluginWarning, SkeletonWarning, in_words
-from ..interop.interrupts import counted_interrupts
-from ..interop.packages import import_open3d
 from .console import echo, flags, say
 from .options import Json, Quiet, Verbose
 
@@ -25,24 +23,20 @@ class WrongUsage(InvalidParameterError):
     """The command line asks for something impossible, whatever the scan holds."""
 
 
-def as_command(function: Callable[..., None], *, with_json: bool) -> Callable[..., None]:
-    """A function as a command: with --quiet, --verbose and perhaps --json, and with errors as lines."""
+def as_command(function: Callable[..., None]) -> Callable[..., None]:
+    """A function as a command: with --json, --quiet and --verbose, and with errors as lines."""
 
     @wraps(function)
     def command(as_json=False, quiet=False, verbose=False, **options):
-        clouds = (options.get(name) for name in ("scan", "cloud", "mesh", "result"))
+        clouds = (options.get(name) for name in ("scan", "cloud", "mesh"))
         cloud = next((path for path in clouds if path is not None), None)
         flags.as_json = as_json
         with reporting(cloud, quiet=quiet, verbose=verbose):
             function(**options)
 
     signature = inspect.signature(function, eval_str=True)  # what Typer makes the options from
-    added = {"as_json": Json} if with_json else {}
-    added |= {"quiet": Quiet, "verbose": Verbose}
-    more = [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
-        for name, kind in added.items()
-    ]
+    added, keyword = {"as_json": Json, "quiet": Quiet, "verbose": Verbose}, inspect.Parameter.KEYWORD_ONLY
+    more = [inspect.Parameter(name, keyword, default=False, annotation=kind) for name, kind in added.items()]
     parameters = [*signature.parameters.values(), *more]
     command.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     return command
@@ -70,41 +64,35 @@ def reporting(cloud: Path | None = None, *, quiet: bool = False, verbose: bool =
         return
     if verbose:
         echo("".join(traceback.format_exception(problem)).rstrip("\n"), err=True)
-    message = _message(problem)
-    say("error", f"{cloud}: {message}" if isinstance(problem, InvalidCloudError) and cloud is not None else message)
+    message, code = in_words(problem), FAILURE_CODE
     if isinstance(problem, KeyboardInterrupt):
-        raise typer.Exit(INTERRUPTED_CODE)
-    raise typer.Exit(USAGE_CODE if isinstance(problem, InvalidParameterError) else FAILURE_CODE)
-
-
-def _message(problem: BaseException) -> str:
-    if isinstance(problem, KeyboardInterrupt):
-        return "interrupted; no file is half-written"
-    if isinstance(problem, MemoryError):
-        return f"out of memory ({problem}): thin the cloud first, for example with voxel_down_sample"
-    return in_words(problem)
+        message, code = "interrupted; no file is half-written", INTERRUPTED_CODE
+    elif isinstance(problem, MemoryError):
+        message = f"out of memory ({problem}): thin the cloud first, for example with voxel_down_sample"
+    elif isinstance(problem, InvalidParameterError):
+        code = USAGE_CODE
+    elif isinstance(problem, InvalidCloudError) and cloud is not None:
+        message = f"{cloud}: {message}"
+    say("error", message)
+    raise typer.Exit(code)
 
 
 @contextmanager
 def _warnings_as_lines() -> Iterator[None]:
     """Say in the end each of our own warnings once, whatever Python's filters are."""
-    lines: dict[str, None] = {}
-
-    def keep(message, category, *place, **more):
-        if issubclass(category, SkeletonWarning | PluginWarning):
-            lines[str(message)] = None
-        else:
-            show(message, category, *place, **more)
-
-    with warnings.catch_warnings():
-        show, warnings.showwarning = warnings.showwarning, keep
-        for category in (SkeletonWarning, PluginWarning):
+    ours = SkeletonWarning, PluginWarning
+    with warnings.catch_warnings(record=True) as caught:
+        for category in ours:
             warnings.simplefilter("always", category)
         try:
             yield
         finally:
-            for line in () if flags.quiet else lines:
+            told = dict.fromkeys(str(it.message) for it in caught if issubclass(it.category, ours))
+            for line in () if flags.quiet else told:
                 say("warning", line)
+    for it in caught:
+        if not issubclass(it.category, ours):
+            warnings.showwarning(it.message, it.category, it.filename, it.lineno)
 
 
 @contextmanager
@@ -120,11 +108,3 @@ def _log_as_lines() -> Iterator[None]:
     finally:
         log.removeHandler(handler)
         log.setLevel(before)
-
-
-def load_open3d() -> None:
-    """Import Open3D with Ctrl-C held back until it is done: interrupted there, it spills pages of text."""
-    with counted_interrupts() as held:
-        import_open3d()
-    if held:
-        raise KeyboardInterrupt

@@ -1,28 +1,26 @@
 """``glsk run``: filter scripts."""
 
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 from typer import Option
 
-from ..errors import FileFormatError, MissingPackageError
-from .completion import complete_scripts
-from .console import echo, flags, print_table, progress, value_in_words
+from ..errors import FileFormatError
+from .console import echo, print_table, progress, value_in_words
 from .options import CutLoops, argument, output_option
-from .outputs import check_outputs, tell, write_each
-from .reporting import WrongUsage, load_open3d
+from .outputs import Output, check_outputs, tell, write_each
+from .reporting import WrongUsage
 
 
 def run(
     script: Annotated[
         str | None,
-        argument("SCRIPT", "A filter script (.mlx), or the name of one in --list.", autocompletion=complete_scripts),
+        argument("SCRIPT", "A filter script (.mlx), or the name of one in --list."),
     ] = None,
     scan: Annotated[Path | None, argument("SCAN", "The cloud or mesh it starts from.")] = None,
     output: Annotated[
         list[Path] | None,
-        output_option("FILE", "The last layer: a skeleton, points (ply, pcd, xyz) or a mesh (ply, obj, off, stl)."),
+        output_option("FILE", "The last layer: a skeleton, points or a mesh (ply, xyz)."),
     ] = None,
     listed: Annotated[bool, Option("--list", help="List the scripts that come with the package.")] = False,
     any_filter: Annotated[
@@ -44,18 +42,17 @@ def run(
     if script is None or scan is None:
         raise WrongUsage("a SCRIPT and a SCAN are needed: glsk run SCRIPT SCAN -o FILE, or --list")
     steps = read_steps(find_script(script), any_filter)
-    outputs, last = output or [], steps[-1]
-    makes = last.verb.makes if last.verb else "skeleton, points or mesh"
-    measures = last.name.startswith("get_")  # a script that ends in a measurement needs no file
+    makes = steps[-1].verb.makes if steps[-1].verb else "skeleton, points or mesh"
+    measures = steps[-1].name.startswith("get_")  # a script that ends in a measurement needs no file
     try:
-        for path in outputs:
+        for path in output or []:
             check_ending(path, makes)
     except FileFormatError as error:
         raise WrongUsage(str(error)) from None
-    check_outputs([(path, "", makes) for path in outputs], scan, needed=None if measures else "an output with -o")
-    with progress(not flags.quiet and not flags.verbose) as update:
+    outputs = [Output(path, ("",), makes, lambda it, path: it.save(path, cut_loops=cut_loops)) for path in output or []]
+    check_outputs(outputs, scan, needed=None if measures else "an output with -o")
+    with progress() as update:
         update(f"reading {scan.name}")
-        load_open3d()
         if any(step.verb is None for step in steps):
             from ..meshlab.meshset import MeshSet
 
@@ -69,13 +66,14 @@ def run(
             update(doing)
             said = layers.apply_step(step, lambda record, doing=doing: update(f"{doing}, solve {record.iteration}"))
             results.append({"filter": step.call.name, "result": _plain(said or {})})
-        written, problems = write_each(dict.fromkeys(outputs, partial(layers.save, cut_loops=cut_loops)), update)
+        files = write_each(outputs, layers, update)
 
     def words() -> None:
         for i, step in enumerate(results, 1):
-            echo(f"{i}. {step['filter']}" + _in_words(step["result"]))
+            told = {name: value for name, value in step["result"].items() if name != "warnings"}
+            echo(f"{i}. {step['filter']}: {value_in_words(told)}".removesuffix(": "))
 
-    tell({"steps": results, "files": list(map(str, written))}, words, written, problems)
+    tell({"steps": results}, words, files)
 
 
 def _plain(result: Any) -> Any:
@@ -91,19 +89,7 @@ def _plain(result: Any) -> Any:
     return result if isinstance(result, bool | int | float | str | None) else str(result)
 
 
-def _in_words(result: dict[str, Any]) -> str:
-    """What a filter says, with the end of a contraction in a few words."""
-    from ..analysis.summary import ENDING_FACTS, ending
-
-    words = [value_in_words({key: value for key, value in result.items() if key not in ("warnings", *ENDING_FACTS)})]
-    if result.keys() >= set(ENDING_FACTS):
-        words.append(ending(result) or "")
-    joined = ", ".join(filter(None, words))
-    return f": {joined}" if joined else ""
-
-
 def _list() -> None:
-    from ..interop.packages import require
     from ..meshlab.script import comment, read_script, scripts
     from ..meshlab.steps import meshlabs_own
 
@@ -111,13 +97,5 @@ def _list() -> None:
         {"name": name, "needs_pymeshlab": bool(meshlabs_own(read_script(path), path)), "doc": comment(path)}
         for name, path in scripts().items()
     ]
-
-    def words() -> None:
-        mark = "\n  needs pymeshlab"
-        print_table([(each["name"] + mark * each["needs_pymeshlab"], each["doc"]) for each in found], wrap=True)
-        try:
-            require("pymeshlab")
-        except MissingPackageError as error:
-            echo(f"\n{error}")
-
-    tell(found, words)
+    rows = [(each["name"] + "\n  needs pymeshlab" * each["needs_pymeshlab"], each["doc"]) for each in found]
+    tell(found, lambda: print_table(rows, wrap=True))

@@ -1,4 +1,4 @@
-"""Meshes of clouds, reconstructed by Open3D or given; their Laplacian by libigl; the skeleton they contract to."""
+"""Meshes of clouds, reconstructed by Open3D; their Laplacian by libigl; the skeleton they contract to."""
 
 import time
 import warnings
@@ -6,31 +6,29 @@ from dataclasses import replace
 from itertools import dropwhile
 
 import numpy as np
-from scipy.sparse import coo_matrix, diags_array
+from scipy.sparse import coo_array, diags_array
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
 from ..contractor import Contractor
-from ..errors import InvalidCloudError, InvalidParameterError, SkeletonWarning
+from ..errors import InvalidCloudError, SkeletonWarning
 from ..interop.clouds import to_point_cloud
 from ..interop.packages import import_open3d, require
 from ..lpr_reducer import LPRReducer
 from ..numerics.cotangent import WEIGHT_CAP
 from ..numerics.frame import MIN_POINTS
-from ..numerics.mesh_rings import clean_faces, mesh_rings, umbrellas
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.vectors import dot
 from ..pipeline import Pipeline, with_stage
 from ..refiner import Refiner
 from ..report import Report
 from ..state import at_rest
+from .mesh_rings import clean_faces, mesh_rings, umbrellas
 
 BALL_RADII = (1.0, 2.0, 4.0)  # fitted: of the rolling balls, in spacings
 POISSON_DEPTHS = (5, 9)  # measured: of the octree; below 5 Open3D makes the same mesh, and complains
 INVENTED_DISTANCE = 3.0  # fitted: spacings from the cloud beyond which Poisson's surface is an invention
 COVERED_SHARE = 0.7  # fitted: of the closed rings that a mesh closes too; below it, Poisson follows on ball pivoting
-# derived: of the diagonal; nearer vertices are points of the cloud: a file may have rounded them to float32
-SAME_VERTEX = 1e-6
 
 
 def spacing(points):
@@ -55,7 +53,8 @@ def poisson(state):
     mesh, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(_oriented(state), depth=depth, n_threads=1)
     vertices, faces = np.array(mesh.vertices), np.asarray(mesh.triangles)
     near = cKDTree(points).query(vertices, distance_upper_bound=INVENTED_DISTANCE * step)[0] < np.inf
-    return without_bare(vertices, clean_faces(vertices, faces[near[faces].all(axis=1)]))
+    used, faces = np.unique(clean_faces(vertices, faces[near[faces].all(axis=1)]), return_inverse=True)
+    return vertices[used], faces.reshape(-1, 3)
 
 
 SURFACES = {"ball_pivoting": ball_pivoting, "poisson": poisson}
@@ -69,45 +68,13 @@ def _oriented(state):
     return cloud
 
 
-def without_bare(vertices, faces):
-    """The mesh without vertices that have no triangle, and the faces renumbered."""
-    used, renumbered = np.unique(faces, return_inverse=True)
-    return vertices[used], renumbered.reshape(-1, 3)
+def surface_of(state, method):
+    """The name of a surface, its vertices in the frame (`state.cloud` itself if these are its points), its faces.
 
-
-def mesh_arrays(mesh):
-    """Vertices, (V, 3) float64, and triangles, (F, 3) int64, of a mesh of Open3D or a pair of arrays.
-
-    InvalidParameterError if it is none, has no triangles, or coordinates or indices are of no use.
+    "auto" is the first surface that closes around enough of the rings that close, or else the last.
     """
-    try:
-        if hasattr(mesh, "triangle"):
-            parts = mesh.vertex.positions.cpu().numpy(), mesh.triangle.indices.cpu().numpy()
-        else:
-            parts = (mesh.vertices, mesh.triangles) if hasattr(mesh, "triangles") else mesh
-        vertices, faces = (np.asarray(part) for part in parts)
-    except Exception as error:  # whatever a foreign object raises
-        raise InvalidParameterError(f"a {type(mesh).__name__} is no triangle mesh: {error}") from error
-    if vertices.shape[1:] != (3,) or faces.shape[1:] != (3,) or len(faces) == 0:
-        shapes = f"{vertices.shape} and {faces.shape}"
-        raise InvalidParameterError(f"a mesh needs (V, 3) vertices and (F, 3) triangles, not {shapes}")
-    if vertices.dtype.kind not in "iuf" or not np.isfinite(vertices).all():
-        raise InvalidParameterError("the mesh has vertices that are not finite numbers")
-    if faces.dtype.kind not in "iu" or faces.min() < 0 or faces.max() >= len(vertices):
-        raise InvalidParameterError("a triangle of the mesh names a missing vertex")
-    return vertices.astype(float), faces.astype(np.int64)
-
-
-def surface_of(state, mesh):
-    """The name of a surface, its vertices in the frame (`state.cloud` itself if these are its points), its faces."""
-    if not isinstance(mesh, str):
-        vertices, faces = _given(state, *mesh_arrays(mesh))
-        if not len(faces):
-            raise InvalidParameterError("no triangle of the mesh has an area")
-        return "given", vertices, faces
-    names = tuple(SURFACES) if mesh == "auto" else (mesh,)
     found, closed = None, state.rings.closed
-    for name in names:
+    for name in SURFACES if method == "auto" else (method,):
         vertices, faces = SURFACES[name](state)
         if len(np.unique(faces)) < MIN_POINTS:
             continue
@@ -116,25 +83,13 @@ def surface_of(state, mesh):
         if both.sum() >= COVERED_SHARE * closed.sum() > 0:
             break
     if found is None:
-        how = " or ".join(names)
-        raise InvalidCloudError(f"no surface can be reconstructed from {len(state.cloud)} points by {how}")
+        raise InvalidCloudError(f"no surface can be reconstructed from {len(state.cloud)} points: {method}")
     return found
-
-
-def _given(state, vertices, faces):
-    """A user's mesh in the frame, on the cloud's own points if these are its vertices."""
-    good = state.sampled
-    vertices = state.frame.into(vertices)
-    distance, nearest = cKDTree(state.frame.into(state.points[good])).query(vertices)
-    if distance.max() < SAME_VERTEX * state.frame.diagonal:
-        row = state.representative_of_point[good][nearest]
-        return state.cloud, clean_faces(state.cloud, row[faces])
-    return without_bare(vertices, clean_faces(vertices, faces))
 
 
 def mesh_laplacian(vertices, faces, cap=WEIGHT_CAP):
     """Twice ``igl.cotmatrix``, capped as `cotangent_laplacian` is, (n, n) csr_matrix; bare vertices have empty rows."""
-    igl = require("igl", "libigl")
+    igl = require("igl")
     faces = faces[igl.doublearea(vertices, faces) > 0]  # igl would divide by them
     laplacian = 2 * igl.cotmatrix(vertices, faces)
     return (diags_array(cap / np.maximum(np.abs(laplacian.diagonal()), cap)) @ laplacian).tocsr()
@@ -142,7 +97,7 @@ def mesh_laplacian(vertices, faces, cap=WEIGHT_CAP):
 
 def mesh_areas(vertices, faces):
     """Area of every vertex, (n,) float array: the mixed Voronoi areas of ``igl.massmatrix`` (Meyer et al. 2003)."""
-    igl = require("igl", "libigl")
+    igl = require("igl")
     areas = igl.massmatrix(vertices, faces, igl.MASSMATRIX_TYPE_VORONOI).diagonal()
     return np.pad(areas, (0, len(vertices) - len(areas)))  # igl leaves out bare vertices at the end
 
@@ -179,7 +134,7 @@ def mesh_state(state, vertices, faces):
             sampled=np.ones(m, bool),
             cloud=vertices,
             noise=np.zeros(m),
-            normals=require("igl", "libigl").per_vertex_normals(vertices, faces),
+            normals=require("igl").per_vertex_normals(vertices, faces),
         )
     survivors, faces = np.unique(faces, return_inverse=True)
     positions, faces, n = vertices[survivors], faces.reshape(-1, 3), len(survivors)
@@ -227,19 +182,13 @@ def orient_normals(points: np.ndarray, normals: np.ndarray, edges: np.ndarray) -
     n = len(points)
     a, b = np.unique(np.sort(edges, axis=1), axis=0).T
     cost = 1 - np.abs(dot(normals[a], normals[b])) + EQUAL_NORMALS_COST
-    tree = minimum_spanning_tree(coo_matrix((cost, (a, b)), shape=(n, n)).tocsr())
+    tree = minimum_spanning_tree(coo_array((cost, (a, b)), shape=(n, n)).tocsr()).tocoo()
     part = connected_components(tree, directed=False)[1]
     outward = points - points.mean(axis=0)
     roots = np.empty(part.max() + 1, int)
     order = np.argsort(dot(outward, outward), kind="stable")
     roots[part[order]] = order  # the last one written, the farthest, stays
-    before = dijkstra(tree, directed=False, indices=roots, min_only=True, return_predecessors=True, unweighted=True)[1]
-    before[roots] = roots
-    sign = _sign(normals, normals[before])
-    while (before != before[before]).any():  # every turn doubles the part of the path that is behind
-        sign, before = sign * sign[before], before[before]
-    return normals * (sign * _sign(normals, outward)[before])[:, None]
-
-
-def _sign(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.where(dot(a, b) < 0, -1.0, 1.0)
+    tree.data = np.where(dot(normals[tree.row], normals[tree.col]) < 0, 1.0, 2.0)  # so ways over odd turns are odd
+    steps, _, root = dijkstra(tree, directed=False, indices=roots, min_only=True, return_predecessors=True)
+    turned = (steps % 2 == 1) ^ (dot(normals, outward) < 0)[root]
+    return np.where(turned[:, None], -normals, normals)

@@ -1,7 +1,6 @@
-"""One component, no loops, another root, fewer branches, fewer vertices, smoother curves."""
+"""One component, no loops, another root, fewer branches, fewer vertices."""
 
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -16,8 +15,6 @@ from ..parameters import check_number
 from ..refinement.merging import merge_into, some_vertices
 from ..refinement.rooted import RootPlace, numbered_from, root_among
 from ..skeleton import Skeleton
-
-SHRINK, SWELL = 0.5, -0.53  # published: factors of a pass there and back, which leave long waves as they are
 
 
 def largest_component(skeleton: Skeleton) -> Skeleton:
@@ -45,12 +42,11 @@ def largest_component(skeleton: Skeleton) -> Skeleton:
     length = np.bincount(part[skeleton.edges[:, 0]], skeleton.edge_lengths, skeleton.n_components)
     stays = part == length.argmax()
     index = np.where(stays, np.cumsum(stays) - 1, -1)
-    vertex = skeleton.vertex_of_point
     return replace(
         skeleton,
         **some_vertices(skeleton, stays),
         edges=index[skeleton.edges[stays[skeleton.edges[:, 0]]]],
-        vertex_of_point=np.append(index, -1)[vertex],
+        vertex_of_point=np.append(index, -1)[skeleton.vertex_of_point],
     )
 
 
@@ -123,15 +119,8 @@ def reroot(skeleton: Skeleton, root: RootPlace = "z") -> Skeleton:
     return replace(rooted, report=replace(rooted.report, root=tuple(rooted.vertices[0].tolist())))
 
 
-def prune(
-    skeleton: Skeleton,
-    *,
-    length: float = 0.0,
-    radius: float = 0.0,
-    order: int | None = None,
-    root: RootPlace | None = None,
-) -> Skeleton:
-    """Drop branches with a free end that are short, thin, or of a high order.
+def prune(skeleton: Skeleton, *, length: float = 0.0, order: int | None = None) -> Skeleton:
+    """Drop branches with a free end that are short, or of a high order.
 
     Parameters
     ----------
@@ -139,12 +128,8 @@ def prune(
     length : float
         Least length of a branch, from junction to tip, in the cloud's units. At every junction the shortest is dropped
         first and the rest is measured anew, so the longest path through it stays.
-    radius : float
-        Least mean radius of a branch, in the same way.
     order : int, optional
-        Highest order that stays, as `branch_table` counts: 0 for the stem alone.
-    root : str, int or (x, y, z), optional
-        Where orders count from, see `branch_table`.
+        Highest order that stays, as `branch_table` counts from the root: 0 for the stem alone.
 
     Returns
     -------
@@ -154,7 +139,7 @@ def prune(
     Raises
     ------
     InvalidParameterError
-        A number is out of range, radii are unknown, or `order` is given for a skeleton with loops.
+        A number is out of range, or `order` is given for a skeleton with loops.
 
     Examples
     --------
@@ -165,106 +150,84 @@ def prune(
     (9, 2)
     """
     check_number("length", length, "float", low=0)
-    check_number("radius", radius, "float", low=0)
     check_number("order", order, "int?", low=0)
-    if radius and not np.isfinite(skeleton.radii).all():
-        raise InvalidParameterError("the skeleton has no radii: it cannot be pruned by them")
     if order is not None:
-        skeleton = _without_orders(skeleton, order, root)
-    if length:
-        skeleton = _without_ends(skeleton, length, lambda now, path: norm(np.diff(now.vertices[path], axis=0)).sum())
-    if radius:
-        skeleton = _without_ends(skeleton, radius, lambda now, path: now.radii[path[1:]].mean())
+        skeleton = _without_orders(skeleton, order)
+    while ends := _short_ends(skeleton, length):
+        group = np.arange(len(skeleton.vertices))
+        for path in ends:
+            group[path] = path[0]
+        skeleton = merge_into(skeleton, group)
     return skeleton
 
 
-def _without_orders(skeleton: Skeleton, order: int, root: RootPlace | None) -> Skeleton:
+def _without_orders(skeleton: Skeleton, order: int) -> Skeleton:
     if skeleton.n_loops:
         raise InvalidParameterError(
             f"the skeleton has {skeleton.n_loops} loops: branches have an order in a tree; see cut_loops (--cut-loops)"
         )
-    table = branch_table(skeleton, root)
+    table = branch_table(skeleton)
     group = np.arange(len(skeleton.vertices))
     for row in np.argsort(table.level, kind="stable").tolist():  # parents before their children
         if table.order[row] > order:
-            path = skeleton.branches[row]
-            away = path[1:] if path[0] == table.start[row] else path[:-1]
-            group[away] = group[table.start[row]]
+            group[skeleton.branches[row]] = group[table.start[row]]
     return merge_into(skeleton, group)
 
 
-def _without_ends(skeleton: Skeleton, least: float, measure: Callable[[Skeleton, np.ndarray], float]) -> Skeleton:
-    """Without branches that end and measure less, the least of each junction first."""
-    while True:
-        worst: dict[int, tuple[float, np.ndarray]] = {}
-        for path in skeleton.branches:
-            path = path[::-1] if skeleton.degree[path[0]] == 1 else path
-            if skeleton.degree[path[0]] > 2 and skeleton.degree[path[-1]] == 1:
-                size, fork = measure(skeleton, path), int(path[0])
-                if size < min(least, worst.get(fork, (np.inf,))[0]):
-                    worst[fork] = size, path
-        if not worst:
-            return skeleton
-        group = np.arange(len(skeleton.vertices))
-        for fork, (_, path) in worst.items():
-            group[path] = fork
-        skeleton = merge_into(skeleton, group)
+def _short_ends(skeleton: Skeleton, least: float) -> list[np.ndarray]:
+    """At each junction the shortest of the branches that end, from there to the tip, if it is too short."""
+    shortest: dict[int, tuple[float, np.ndarray]] = {}
+    for path in skeleton.branches:
+        path = path[::-1] if skeleton.degree[path[0]] == 1 else path
+        if skeleton.degree[path[0]] > 2 and skeleton.degree[path[-1]] == 1:
+            length, fork = norm(np.diff(skeleton.vertices[path], axis=0)).sum(), int(path[0])
+            if length < min(least, shortest.get(fork, (np.inf,))[0]):
+                shortest[fork] = length, path
+    return [path for _, path in shortest.values()]
 
 
-def simplify(skeleton: Skeleton, *, tolerance: float | None = None, n: int | None = None) -> Skeleton:
+def simplify(skeleton: Skeleton, *, tolerance: float = 0.0) -> Skeleton:
     """Drop vertices where the curve is straight, branch by branch (Douglas and Peucker 1973).
 
     Parameters
     ----------
     skeleton : Skeleton
-    tolerance : float, optional
+    tolerance : float
         How far a dropped vertex may be from the simpler curve, in the cloud's units.
-    n : int, optional
-        Number of vertices to keep, the most important first; give either this or `tolerance`. Ends, junctions, and the
-        vertices that keep every loop always stay.
 
     Returns
     -------
     Skeleton
-        Points of a dropped vertex belong to the nearest remaining one along the branch.
+        Ends, junctions, and the vertices that keep every loop stay. Points of a dropped vertex belong to the nearest
+        remaining one along the branch.
 
     Raises
     ------
     InvalidParameterError
-        Neither is given, or both, or one is out of range.
+        The tolerance is negative.
 
     Examples
     --------
     >>> from glsk_o3d import skeletonize
     >>> from glsk_o3d.samples import torus
     >>> ring = skeletonize(torus(2000).points)
-    >>> simplify(ring, n=12)
-    Skeleton(12 vertices, 12 edges, 1 components, 1 loops, 0 leaves, 0 junctions)
+    >>> simplify(ring, tolerance=1.0)
+    Skeleton(3 vertices, 3 edges, 1 components, 1 loops, 0 leaves, 0 junctions)
     """
-    if (tolerance is None) == (n is None):
-        raise InvalidParameterError("simplify needs either a tolerance or n")
-    check_number("tolerance", tolerance, "float?", low=0)
-    check_number("n", n, "int?", low=1)
-    matters = np.full(len(skeleton.vertices), np.inf)
+    check_number("tolerance", tolerance, low=0)
+    group = np.arange(len(skeleton.vertices))
     twins = Counter(tuple(sorted((path[0], path[-1]))) for path in skeleton.branches)
     for path in skeleton.branches:
-        here = _significance(skeleton.vertices[path])
+        curve = skeleton.vertices[path]
+        stays = _significance(curve)
+        inner = stays[1:-1]
         if path[0] == path[-1]:  # a ring is at least a triangle
-            here[np.argsort(here[1:-1])[-2:] + 1] = np.inf
+            inner[np.argsort(inner)[-2:]] = np.inf
         elif twins[tuple(sorted((path[0], path[-1])))] > 1 and len(path) > 2:
-            here[np.argmax(here[1:-1]) + 1] = np.inf
-        matters[path[1:-1]] = here[1:-1]
-    if n is None:
-        stays = matters > tolerance
-    else:
-        stays = np.zeros(len(matters), bool)
-        stays[np.argsort(-matters, kind="stable")[: max(n, np.isinf(matters).sum())]] = True
-    group = np.arange(len(matters))
-    for path in skeleton.branches:
-        along, kept = arc_lengths(skeleton.vertices[path]), np.flatnonzero(stays[path])
-        if len(kept):  # of a ring without a junction the first vertex may go, and is the last one too
-            nearest = np.abs(along[:, None] - along[kept]).argmin(axis=1)
-            group[path[1:-1]] = path[kept[nearest[1:-1]]]
+            inner[np.argmax(inner)] = np.inf
+        along, kept = arc_lengths(curve), np.flatnonzero(stays > tolerance)
+        nearest = np.abs(along[1:-1, None] - along[kept]).argmin(axis=1)
+        group[path[1:-1]] = path[kept[nearest]]
     return merge_into(skeleton, group)
 
 
@@ -284,35 +247,3 @@ def _significance(curve: np.ndarray) -> np.ndarray:
         found[farthest] = min(float(away.max()), found[first], found[last])
         parts += [(first, farthest), (farthest, last)]
     return found
-
-
-def smooth(skeleton: Skeleton, *, passes: int = 10) -> Skeleton:
-    """Smooth the curves without shrinking them (Taubin 1995, "A signal processing approach to fair surface design").
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-    passes : int
-        Number of passes; more remove longer waves. Ends and junctions do not move.
-
-    Returns
-    -------
-    Skeleton
-
-    Examples
-    --------
-    >>> from glsk_o3d import skeletonize
-    >>> from glsk_o3d.samples import torus
-    >>> ring = skeletonize(torus(2000, noise=0.01).points)
-    >>> abs(smooth(ring).length / ring.length - 1) < 0.02
-    True
-    """
-    check_number("passes", passes, "int", low=0)
-    inner = np.flatnonzero(skeleton.degree == 2)
-    ends = np.concatenate([skeleton.edges, skeleton.edges[:, ::-1]])
-    ends = ends[np.argsort(ends[:, 0], kind="stable")]
-    beside = ends[skeleton.degree[ends[:, 0]] == 2, 1].reshape(-1, 2)  # in the order of `inner`
-    vertices = skeleton.vertices.copy()
-    for factor in (SHRINK, SWELL) * passes:
-        vertices[inner] += factor * (vertices[beside].mean(axis=1) - vertices[inner])
-    return replace(skeleton, vertices=vertices)

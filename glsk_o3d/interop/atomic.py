@@ -33,15 +33,11 @@ def write_atomically(path: str | os.PathLike, write: Callable[[Path], object]) -
     """Write a file so that it appears complete or not at all.
 
     `write` makes a temporary file in the same folder, with the same ending, given its path. If it raises, that file is
-    removed and the old one stays. Of a symbolic link the target is replaced. A FileNotFoundError says that the folder
-    does not exist, an OSError that the path is a folder or a device, or cannot be written; it names the path, not the
-    temporary file.
+    removed and the old one stays. Of a symbolic link the target is replaced. Raises as `check_place` does, and OSError,
+    which names the path, where it cannot be written.
     """
+    check_place(path)
     given, path = path, Path(os.path.realpath(path))
-    if not path.parent.is_dir():
-        raise FileNotFoundError(f"{path.parent}: no such folder: make it before writing {path.name}")
-    if path.exists() and not path.is_file():
-        raise OSError(f"{path} is a folder or a device, not a file to write to")
     temporary = path.with_name(f".{uuid.uuid4().hex}{path.suffix}")
     try:
         with writing(given):
@@ -51,6 +47,15 @@ def write_atomically(path: str | os.PathLike, write: Callable[[Path], object]) -
             os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def check_place(path: str | os.PathLike) -> None:
+    """FileNotFoundError if the folder of a file does not exist, OSError if the path is a folder or a device."""
+    given, real = Path(path), Path(os.path.realpath(path))
+    if not real.parent.is_dir():
+        raise FileNotFoundError(f"{given.parent}: no such folder: make it before writing {given.name}")
+    if real.exists() and not real.is_file():
+        raise OSError(f"{given}: is a folder or a device, not a file to write to")
 
 
 @contextmanager
@@ -65,9 +70,6 @@ def writing(path: str | os.PathLike) -> Iterator[None]:
 
 
 def check_ending(path: str | os.PathLike, what: str, *endings: str) -> None:
-    """Raise FileFormatError unless the name of a file to be written has one of the endings of what is written.
-
-    The message says `what` that is, such as ``"preview is a picture"``, and names the first ending.
-    """
-    if Path(path).suffix.lower() not in endings:
-        raise FileFormatError(f"{os.fspath(path)}: the {what} and its name ends in {endings[0]}")
+    """FileFormatError unless a file's name has one of the endings of `what` it is, such as ``"picture is a PNG"``."""
+    if not Path(path).name.lower().endswith(endings):
+        raise FileFormatError(f"{os.fspath(path)}: the {what} and its name ends in {' or '.join(endings)}")

@@ -18,9 +18,7 @@ MOST_NEIGHBOURS = 30  # within a radius without a limit of its own: as many as O
 
 
 class Cloud:
-    """Anything that carries points: what a filter of clouds `consumes` or `produces`.
-
-    It is only a name, without instances and subclasses. `cloud_points` defines what counts as a cloud.
+    """What a filter of clouds `consumes` or `produces`: anything that `cloud_points` takes. It has no instances.
 
     Examples
     --------
@@ -82,9 +80,8 @@ def cloud_points(cloud: Any) -> np.ndarray:
 def cloud_counts(cloud: Any, finite: np.ndarray) -> tuple[np.ndarray | None, int, int]:
     """How many points of a larger cloud each of the `finite` points, (N,) bool array, of a sample stands for.
 
-    The numbers are those of the attribute ``sample_count`` of a tensor cloud, as `glsk_o3d.read_sample` gives it: (n,)
-    float array, None if there is none. Two ints follow: for how many points the finite ones stand together, and all
-    others. InvalidCloudError if they are no counts.
+    (n,) float array, the attribute ``sample_count`` of a tensor cloud, None if there is none; and two ints, the sums
+    for the finite points and for all others. InvalidCloudError if they are no counts.
     """
     name, tensor = open3d_class(cloud)
     if not (name == "PointCloud" and tensor and SAMPLE_COUNT in cloud.point):
@@ -105,10 +102,9 @@ def _held(cloud: Any) -> Any:
     if name == "Tensor":
         return cloud.cpu().numpy()
     if name in ("PointCloud", "TriangleMesh"):
-        field = "point" if name == "PointCloud" else "vertex"
         if not tensor:
-            return cloud.points if field == "point" else cloud.vertices
-        attributes = getattr(cloud, field)
+            return cloud.points if name == "PointCloud" else cloud.vertices
+        attributes = cloud.point if name == "PointCloud" else cloud.vertex
         return attributes.positions.cpu().numpy() if "positions" in attributes else np.empty((0, 3))
     if name == "" or name.endswith("Vector"):
         return cloud

@@ -21,8 +21,8 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
     - ``branch`` (N, 1) int32: the row of `glsk_o3d.analysis.branch_table`, as from `glsk_o3d.analysis.segment`;
     - ``order`` (N, 1) int32: that of the branch in that table, 0 for axes at the root;
     - ``radius`` and ``confidence`` (N, 1), of the type of the positions: those of the vertex;
-    - ``thickness`` (N, 1), of that type: the radius over how far the points are apart, see
-      `glsk_o3d.analysis.thickness`.
+    - ``thickness`` (N, 1), of that type: the radius over the distance to the eighth nearest point. Well above 1 the
+      cloud shows the surface of the part; below 1 the radius is a guess.
 
     Points that are not finite have -1 or NaN. Attributes of these names are replaced.
 

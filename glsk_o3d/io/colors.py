@@ -7,10 +7,9 @@ import numpy as np
 
 from ..analysis.branches import branch_table
 from ..analysis.segmentation import thickness_of_points
-from ..errors import InvalidParameterError
 from ..interop.packages import require
 from ..numerics.groups import group_median
-from ..skeleton import Skeleton
+from ..skeleton import Skeleton, as_color
 
 ColorChoice: TypeAlias = Literal["branch", "order", "radius", "confidence", "support", "thickness"] | Sequence[float]
 """What colours show, or one colour for all: red, green and blue from 0 to 1."""
@@ -31,13 +30,7 @@ def shades(skeleton: Skeleton, color: ColorChoice, branch: np.ndarray, vertices:
     of its vertices; where `branch` or one of `vertices` is -1, it is grey.
     """
     if not isinstance(color, str) or color not in COLOR_NAMES:
-        try:
-            one = np.asarray(color, float)
-        except (TypeError, ValueError):
-            one = np.empty(0)
-        if one.shape != (3,) or not ((one >= 0) & (one <= 1)).all():
-            raise InvalidParameterError(f"color = {color!r}: must be one of {COLOR_NAMES} or three numbers from 0 to 1")
-        return np.tile(one, (len(branch), 1))
+        return np.tile(as_color(color, f"must be one of {COLOR_NAMES} or three numbers from 0 to 1"), (len(branch), 1))
     if color == "branch":
         return _in_turn(branch)
     if color == "order":

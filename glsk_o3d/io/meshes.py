@@ -1,4 +1,4 @@
-"""Triangle meshes from files, as scans of their vertices, to files, and from Open3D."""
+"""Triangle meshes from files, as scans of their vertices, and to files."""
 
 import os
 import re

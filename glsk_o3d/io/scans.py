@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import FileFormatError, InvalidCloudError, MissingPackageError, brief
 from ..interop.atomic import check_ending, write_atomically
-from ..interop.packages import following_open3d, import_open3d
+from ..interop.packages import import_open3d
 from . import meshes
 from .formats import pcd, ply, scanners, text_tables
 from .paths import MESH_ENDINGS, SCAN_ENDINGS, TEXT_ENDINGS, existing_file, unknown_ending
@@ -116,12 +116,11 @@ def read_scan(path: str | os.PathLike, where: str | None = None) -> Scan:
     """Read all that `read_tensor_cloud` does, and the triangles between the points of a mesh if all are taken."""
     scan = next(read_blocks(path, rows=ALL_ROWS, where=where))
     if _coarse(scan.positions, scan.triangles):
-        with following_open3d():
-            _log.warning(
-                "%s: the %d vertices of this mesh are far apart, and only vertices count as points: sample its surface "
-                "first, for example with Open3D's sample_points_uniformly",
-                *(os.fspath(path), len(scan)),
-            )
+        _log.warning(
+            "%s: the %d vertices of this mesh are far apart, and only vertices count as points: sample its surface "
+            "first, for example with Open3D's sample_points_uniformly",
+            *(os.fspath(path), len(scan)),
+        )
     return scan
 
 

@@ -9,10 +9,13 @@ from typing import Any
 import numpy as np
 
 from ..interop.packages import require
-from .script import BOOL, FLOAT, INT, LENGTH, MATRIX, POINT, TEXT, Param
+from .script import Param
 
 ON_LAYERS = ("apply_", "compute_", "create_", "delete_", "generate_", "get_", "meshing_", "set_", "transfer_")
 """Beginnings of the names of filters that work on layers; others save, load, export or build files."""
+
+
+LENGTHS = ("RichAbsPerc", "RichPercentage")
 
 
 @cache
@@ -52,37 +55,27 @@ class Builtin:
     name: str
     default: Any
 
-    @property
-    def types(self) -> tuple[str, ...]:
-        """The types that it may have in a script."""
-        for kind, types in ((bool, BOOL), (int, INT), (float, FLOAT + LENGTH), (str, TEXT)):
-            if isinstance(self.default, kind):
-                return types
-        if isinstance(self.default, np.ndarray):
-            return POINT if self.default.size == 3 else MATRIX
-        return ("RichColor",) if type(self.default).__name__ == "Color" else ()
-
     def read(self, param: Param) -> Any:
         """The value of a parameter in a script as pymeshlab takes it, who is asked; ValueError if it is wrong."""
-        pymeshlab, value = require("pymeshlab"), param.value(self.types)
-        if is_layer(self.name, self.default) and value < 0:
-            raise ValueError(f"there is no layer {value}")
         try:
-            if param.type in LENGTH and isinstance(value, str):
-                value = pymeshlab.PercentageValue(float(value[:-1]))
-            elif param.type in LENGTH:
-                value = pymeshlab.PureValue(value)
-            elif param.type == "RichColor":
-                value = pymeshlab.Color(*value)
-            elif isinstance(value, list):
-                value = np.reshape(value, np.shape(self.default))
+            value = self._value(param.text, param.type in LENGTHS)
             trial().filter_parameter_values(self.filter, **{self.name: value})
         except Exception as error:  # pymeshlab's exceptions have no base of their own
-            reason = str(error).partition("\n")[0]
-            if "Unable to cast" in reason:
-                reason = f"a {param.type} is not what it takes"
-            raise ValueError(reason) from None
+            raise ValueError(f"{param.text!r}: " + str(error).partition("\n")[0]) from None
+        if is_layer(self.name, self.default) and value < 0:
+            raise ValueError(f"there is no layer {value}")
         return value
+
+    def _value(self, text: str, is_length: bool) -> Any:
+        pymeshlab, kind = require("pymeshlab"), type(self.default)
+        if is_length:
+            share = text.endswith("%")
+            return pymeshlab.PercentageValue(float(text[:-1])) if share else pymeshlab.PureValue(float(text))
+        if kind is bool:
+            return {"true": True, "false": False}[text.lower()]
+        if kind is np.ndarray:
+            return np.reshape([float(each) for each in text.split(",")], self.default.shape)
+        return kind(*map(int, text.split(","))) if kind is pymeshlab.Color else kind(text)
 
 
 def slots(filter: str, any_filter: bool = False) -> dict[str, Builtin]:

@@ -13,18 +13,16 @@ import numpy as np
 from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ..interop.atomic import write_atomically
 from ..interop.clouds import cloud_points
-from ..interop.packages import import_open3d, require
+from ..interop.packages import require
 from ..io.formats import ply
 from ..io.formats.graphs import graph_skeleton
 from ..io.paths import existing_file
 from ..io.scan import COLOR_CHANNELS
 from ..io.scans import read_scan
 from ..io.skeletons import holds_skeleton, read_skeleton, save_skeleton, skeleton_ending
-from ..points import Points
 from ..skeleton import Skeleton
-from ..state import Contraction
 
-LAYER_ENDINGS = {"points": (".ply", ".pcd", ".xyz"), "mesh": (".ply", ".obj", ".off", ".stl")}
+LAYER_ENDINGS = {"points": (".ply", ".xyz"), "mesh": (".ply",)}
 """What layers without edges are written as."""
 
 
@@ -32,9 +30,9 @@ LAYER_ENDINGS = {"points": (".ply", ".pcd", ".xyz"), "mesh": (".ply", ".obj", ".
 class Layer:
     """Vertices with what hangs on them, (N, ...) arrays: MeshLab calls the scalars quality.
 
-    Scalars are the radii of a skeleton, the multiplicities of a contracted cloud, the branches of a segmented one.
-    Colours are red, green, blue and alpha from 0 to 1. `flow` is what our filters pass on, of which the vertices are
-    the visible part, `source` the layer that it was made from, and `cut` the places where loops were cut.
+    Scalars are the radii of a skeleton, or the branches of a segmented cloud. Colours are red, green, blue and alpha
+    from 0 to 1. `skeleton` is what the vertices and edges show, `source` the layer that it was made from, and `cut` the
+    places where loops were cut.
     """
 
     vertices: np.ndarray
@@ -44,21 +42,17 @@ class Layer:
     scalars: np.ndarray | None = None
     colors: np.ndarray | None = None
     label: str = "cloud"
-    flow: Points | Contraction | Skeleton | None = None
+    skeleton: Skeleton | None = None
     source: Layer | None = None
     cut: list[list[float]] | None = None
 
     @classmethod
     def of(cls, data: Any, label: str = "cloud", source: Layer | None = None) -> Layer:
-        """The layer that shows a skeleton, a contraction or a cloud."""
-        common: dict[str, Any] = dict(label=label, source=source)
+        """The layer that shows a skeleton or a cloud."""
         if isinstance(data, Skeleton):
-            return cls(data.vertices, edges=data.edges, scalars=data.radii, flow=data, **common)
-        if isinstance(data, Contraction):
-            return cls(data.contracted, scalars=data.mass, flow=data, **common)
-        if isinstance(data, Points):
-            return cls(data.coordinates, scalars=data.noise[data.survivors], flow=data, **common)
-        return cls(cloud_points(data), **common)
+            facts: dict[str, Any] = dict(edges=data.edges, scalars=data.radii, skeleton=data)
+            return cls(data.vertices, label=label, source=source, **facts)
+        return cls(cloud_points(data), label=label, source=source)
 
     @classmethod
     def read(cls, path: str | os.PathLike) -> Layer:
@@ -75,9 +69,10 @@ class Layer:
         scan = read_scan(path)
         points, normals, faces, colors = scan.positions, scan.normals, scan.triangles, scan.colors
         if path.suffix.lower() == ".stl":
-            mesh = _open3d_mesh(points, faces, normals)
-            mesh.remove_duplicated_vertices()
-            points, normals, faces = map(np.array, (mesh.vertices, mesh.vertex_normals, mesh.triangles))
+            _, first, same = np.unique(points, axis=0, return_index=True, return_inverse=True)
+            kept = np.sort(first)
+            points, faces = points[kept], np.searchsorted(kept, first[same.ravel()])[faces]
+            normals = None if normals is None else normals[kept]
         return cls(
             points,
             faces=faces if len(faces) else None,
@@ -91,10 +86,7 @@ class Layer:
     def of_mesh(cls, mesh: Any) -> Layer:
         """A ``pymeshlab.Mesh`` as its matrix shows it; what nobody has set, zeros or white, is left out."""
         normals, scalars, colors = mesh.vertex_normal_matrix(), mesh.vertex_scalar_array(), mesh.vertex_color_matrix()
-        # normals keep their lengths, and stay normal where the matrix is no rotation
-        turned = normals @ np.linalg.pinv(mesh.transform_matrix()[:3, :3])
-        before, after = (np.linalg.norm(vectors, axis=1, keepdims=True) for vectors in (normals, turned))
-        turned *= np.divide(before, after, out=np.ones_like(after), where=after > 0)
+        turned = normals @ np.linalg.pinv(mesh.transform_matrix()[:3, :3])  # stay normal if it is no rotation
         return cls(
             mesh.transformed_vertex_matrix(),
             faces=mesh.face_matrix() if mesh.face_number() else None,
@@ -108,7 +100,7 @@ class Layer:
     @property
     def is_skeleton(self) -> bool:
         """Whether it has vertices and edges alone, or is a skeleton of ours, of a single vertex perhaps."""
-        return isinstance(self.flow, Skeleton) or (self.edges is not None and self.faces is None)
+        return self.skeleton is not None or (self.edges is not None and self.faces is None)
 
     @property
     def diagonal(self) -> float:
@@ -116,44 +108,34 @@ class Layer:
         finite = self.vertices[np.isfinite(self.vertices).all(axis=1)]
         return math.hypot(*np.ptp(finite, axis=0)) if len(finite) else 0.0
 
-    def holds(self, kind: type) -> bool:
-        """Whether there is something to go on from, with its points: those of a file have none."""
-        return isinstance(self.flow, kind) and self.flow is not None and len(self.flow.points) > 0
-
     def shows(self, other: Layer) -> bool:
-        """Whether both have the same vertices and edges, so that the one's flow is still the other's."""
+        """Whether both have the same vertices and edges, so that the one's skeleton is still the other's."""
         none = np.empty((0, 2), int)
         mine, its = (none if layer.edges is None else layer.edges for layer in (self, other))
         return np.array_equal(self.vertices, other.vertices) and np.array_equal(mine, its)
 
     def cloud(self) -> np.ndarray:
-        """The vertices of a layer that is a scan; InvalidCloudError for a skeleton and a contracted cloud."""
-        flow, what = self.flow, None
+        """The vertices of a layer that is a scan; InvalidCloudError for a skeleton."""
         if self.is_skeleton:
-            what = "a skeleton or another line drawing: make the scan the current layer"
-        elif (
-            isinstance(flow, Contraction) and flow.report.iterations and np.array_equal(self.vertices, flow.contracted)
-        ):
-            what = "contracted and no scan: make the scan the current layer, or go on with generate_skeleton_graph_glsk"
-        if what:
-            raise InvalidCloudError(f"the current layer ({self.label}) is {what}")
+            what = "is a skeleton or another line drawing: make the scan the current layer"
+            raise InvalidCloudError(f"the current layer ({self.label}) {what}")
         return self.vertices
 
     def summary(self) -> dict[str, Any]:
         """The layer in a few numbers, as MeshLab's filters return them."""
         found: dict[str, Any] = {"vertices": len(self.vertices)}
-        flow = self.flow
-        if isinstance(flow, Skeleton):
-            found |= {"edges": len(flow.edges), "components": flow.n_components, "loops": flow.n_loops}
-            found |= {"length": flow.length}
+        skeleton = self.skeleton
+        if skeleton is not None:
+            found |= {"edges": len(skeleton.edges), "components": skeleton.n_components, "loops": skeleton.n_loops}
+            found |= {"length": skeleton.length}
+            report = skeleton.report
+            if report.stages:  # else it is from a file
+                found |= {"iterations": len(report.iterations), "converged": report.converged}
+                found |= {"stop_reason": report.stop_reason, "warnings": list(report.warnings)}
         elif self.colors is not None and self.scalars is not None:
             found["branches"] = int(self.scalars.max(initial=-1)) + 1
         if self.cut is not None:
             found["cut"] = self.cut
-        if flow is not None and flow.report.stages:  # else it is from a file
-            report = flow.report
-            found |= {"iterations": len(report.iterations), "converged": report.converged}
-            found |= {"stop_reason": report.stop_reason, "warnings": list(report.warnings)}
         return found
 
     def to_pymeshlab(self) -> Any:
@@ -174,25 +156,24 @@ class Layer:
 
     def to_skeleton(self) -> Skeleton:
         """The skeleton that the layer shows: that of our filters, or else its vertices and edges with what is known."""
-        if isinstance(self.flow, Skeleton):
-            return self.flow
+        if self.skeleton is not None:
+            return self.skeleton
         return graph_skeleton(self.vertices, np.empty((0, 2)) if self.edges is None else self.edges, self.scalars)
 
     def save(self, path: str | os.PathLike, **options: Any) -> None:
         """Write the layer, complete or not at all: a skeleton by `save_skeleton`, which has the options.
 
-        Others by their endings: ``.ply`` with everything, the scalars as ``quality`` as MeshLab has it, ``.pcd`` in
-        float32 with normals and colours, or ``.xyz``; a mesh also as ``.obj``, ``.off`` or ``.stl``.
+        Others as ``.ply`` with everything, the scalars as ``quality`` as MeshLab has it, or their vertices as ``.xyz``.
         """
         path = Path(path)
         if self.is_skeleton:
             save_skeleton(self.to_skeleton(), path, **options)
             return
         check_ending(path, "points" if self.faces is None else "points or mesh")
-        if path.suffix.lower() == ".xyz":
-            write_atomically(path, lambda temporary: np.savetxt(temporary, self.vertices, fmt="%.17g"))
-        else:
-            write_atomically(path, self._write_ply if path.suffix.lower() == ".ply" else self._write_open3d)
+        as_text = path.suffix.lower() == ".xyz"
+        write_atomically(
+            path, lambda file: np.savetxt(file, self.vertices, "%.17g") if as_text else self._write_ply(file)
+        )
 
     def _write_ply(self, path: Path) -> None:
         columns = dict(zip("xyz", self.vertices.T.astype(float), strict=True))
@@ -204,36 +185,6 @@ class Layer:
         if self.scalars is not None:
             columns["quality"] = np.asarray(self.scalars, float)
         path.write_bytes(ply.content(columns, self.faces if self.faces is not None and len(self.faces) else None))
-
-    def _write_open3d(self, path: Path) -> None:
-        o3d = import_open3d()
-        colors = None if self.colors is None else self.colors[:, :3]
-        if path.suffix.lower() in LAYER_ENDINGS["points"]:
-            cloud = o3d.geometry.PointCloud(_vectors(self.vertices))
-            cloud.normals, cloud.colors = _vectors(self.normals), _vectors(colors)
-            done = o3d.io.write_point_cloud(str(path), cloud)
-        else:
-            mesh = _open3d_mesh(self.vertices, self.faces, self.normals)
-            mesh.vertex_colors = _vectors(colors)
-            if path.suffix.lower() == ".stl":
-                mesh.compute_triangle_normals()
-            done = o3d.io.write_triangle_mesh(str(path), mesh)
-        if not done:
-            raise FileFormatError(f"{path}: Open3D cannot write it")
-
-
-def _vectors(array):
-    """Rows of three, or none, as Open3D holds them."""
-    rows = np.empty((0, 3)) if array is None else np.ascontiguousarray(array, float)
-    return import_open3d().utility.Vector3dVector(rows)
-
-
-def _open3d_mesh(points, faces, normals):
-    o3d = import_open3d()
-    triangles = o3d.utility.Vector3iVector(np.ascontiguousarray(faces, np.int32))
-    mesh = o3d.geometry.TriangleMesh(_vectors(points), triangles)
-    mesh.vertex_normals = _vectors(normals)
-    return mesh
 
 
 def check_ending(path: Path, what: str) -> None:

@@ -5,13 +5,11 @@ import re
 import tempfile
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import FileFormatError, GlskError, InvalidCloudError, InvalidParameterError, did_you_mean
-from ..interop.atomic import write_atomically
+from ..errors import FileFormatError, GlskError, InvalidCloudError, InvalidParameterError, did_you_mean, in_words
 from ..interop.packages import require
 from ..io.paths import SCAN_ENDINGS, existing_file
 from ..io.skeletons import FORMATS, holds_skeleton
@@ -20,7 +18,7 @@ from . import builtin
 from .layers import Layer
 from .script import Call, read_script, script_text, write_script
 from .steps import Step, read_steps, step
-from .verbs import verbs
+from .verbs import Verb, verbs
 
 pymeshlab = require("pymeshlab")
 
@@ -29,9 +27,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
     """``pymeshlab.MeshSet`` with the filters of this package added.
 
     Our filters are called like MeshLab's, by name or as methods, and can be mixed with them in filter scripts. Each
-    makes a new current layer: a skeleton has vertices, edges, and the radii as vertex scalars. A filter continues from
-    the layer of an earlier one of ours if its vertices and edges are unchanged. On any other layer the vertices are the
-    cloud, and the earlier steps run with their defaults.
+    makes a new current layer: a skeleton has vertices, edges, and the radii as vertex scalars.
 
     A length is ``pymeshlab.PercentageValue`` or a string such as ``"2%"``, of the diagonal of the layer's bounding box
     as in MeshLab; or ``pymeshlab.PureValue`` or a float, in the units of the cloud. Defaults refer to the box of
@@ -53,7 +49,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
     def __init__(self, *args: Any, **kwargs: Any):
         super().__init__(*args, **kwargs)
         self._script: list[Step] = []
-        self._flows: dict[int, Layer] = {}  # what our filters made, by the number of the layer
+        self._made: dict[int, Layer] = {}  # what our filters made, by the number of the layer
 
     def apply_filter(self, filter_name: str, **params: Any) -> dict[str, Any]:
         """Apply a filter of MeshLab's or ours to the current layer.
@@ -72,10 +68,8 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
 
         Raises
         ------
-        InvalidParameterError
-            There is no such filter; or one of ours was given an unknown parameter or a wrong value.
-        InvalidCloudError
-            The layer cannot be skeletonised.
+        InvalidParameterError, InvalidCloudError
+            There is no such filter; or one of ours cannot be run so, or not on this layer.
         pymeshlab.PyMeshLabException
             A filter of MeshLab's failed.
         """
@@ -103,8 +97,8 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         assert step.verb is not None
         layer = step.verb.run(self.layer(step.values.get("layer", -1)), step.values, on_iteration)
         self.add_mesh(layer.to_pymeshlab(), layer.label)
-        self._flows = {number: known for number, known in self._flows.items() if self.mesh_id_exists(number)}
-        self._flows[self.current_mesh_id()] = layer
+        self._made = {number: known for number, known in self._made.items() if self.mesh_id_exists(number)}
+        self._made[self.current_mesh_id()] = layer
         return {"layer": self.current_mesh_id(), **layer.summary()}
 
     def _run_theirs(self, name: str, params: dict[str, Any]) -> dict[str, Any]:
@@ -126,41 +120,19 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
             super().save_filter_script(file)
             return read_script(file)[0]
 
-    def filter_parameter_values(self, filter_name: str, **params: Any) -> dict[str, Any]:
-        """The parameters that `apply_filter` would use: the given ones, and defaults."""
-        if filter_name in verbs():
-            return verbs()[filter_name].values(_plain_lengths(params))
-        return super().filter_parameter_values(filter_name, **params)
-
     @staticmethod
     def filter_list() -> list[str]:
         """The names of all filters, MeshLab's and ours."""
         return [*pymeshlab.filter_list(), *verbs()]
 
     @staticmethod
-    def print_filter_list() -> None:
-        """Print the names of all filters, MeshLab's and ours."""
-        print("\n".join(MeshSet.filter_list()))
-
-    @staticmethod
     def print_filter_parameter_list(filter_name: str) -> None:
-        """Print the parameters of a filter: name, type and default; of ours also limits and meaning."""
+        """Print the parameters of a filter: of MeshLab's name, type and default, of ours what they mean."""
         verb = verbs().get(_known(filter_name))
         if verb is None:
             pymeshlab.print_filter_parameter_list(filter_name)
-            return
-        print(f"{filter_name} filter - list of parameter names:")
-        defaults = verb.values({})
-        for name, slot in verb.slots.items():
-            print(slot.listing(defaults.get(name, "as the pipeline has it")))
-
-    @staticmethod
-    def search(word: str) -> None:
-        """Print the filters, MeshLab's and ours, whose names or descriptions have a word."""
-        for verb in verbs().values():
-            if all(part in f"{verb.name} {verb.title} {verb.doc}".lower() for part in word.lower().split()):
-                print(f"{verb.name} : {verb.doc}")
-        pymeshlab.search(word)
+        else:
+            print(verb.help)
 
     def load_filter_script(self, filter_script_name: str | os.PathLike, *, any_filter: bool = False) -> None:
         """Make a script file the current script. It is checked and not run; ScriptError names faults.
@@ -207,13 +179,13 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         number = self.current_mesh_id() if number == -1 else number
         if not self.mesh_id_exists(number):
             raise InvalidParameterError(f"layer = {number}: there is no such layer")
-        layer, known = Layer.of_mesh(self.mesh(number)), self._flows.get(number)
+        layer, known = Layer.of_mesh(self.mesh(number)), self._made.get(number)
         if known is None or not known.shows(layer):
             return layer
-        flow, scalars = known.flow, self.mesh(number).vertex_scalar_array()
-        if isinstance(flow, Skeleton) and not np.array_equal(scalars, flow.radii, equal_nan=True):
-            flow = replace(flow, radii=scalars, half_width=scalars, half_thickness=scalars)
-        return replace(layer, edges=known.edges, flow=flow, source=known.source)
+        skeleton, scalars = known.skeleton, self.mesh(number).vertex_scalar_array()
+        if skeleton is not None and not np.array_equal(scalars, skeleton.radii, equal_nan=True):
+            skeleton = replace(skeleton, radii=scalars, half_width=scalars, half_thickness=scalars)
+        return replace(layer, edges=known.edges, skeleton=skeleton, source=known.source)
 
     def current_skeleton(self) -> Skeleton:
         """The skeleton in the current layer; its radii are the layer's scalars. InvalidCloudError if it has no edges.
@@ -231,13 +203,13 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         FileNotFoundError or FileFormatError without points. `load_new_mesh` also has colours of faces and textures.
         """
         path = existing_file(path)
+        if path.suffix.lower() in SCAN_ENDINGS or holds_skeleton(path):
+            self.add_mesh(Layer.read(path).to_pymeshlab(), path.name)
+            return
         try:
-            if path.suffix.lower() in SCAN_ENDINGS or holds_skeleton(path):
-                self.add_mesh(Layer.read(path).to_pymeshlab(), path.name)
-            else:
-                self.load_new_mesh(str(path))
+            self.load_new_mesh(str(path))
         except pymeshlab.PyMeshLabException as error:
-            raise FileFormatError(f"{path}: MeshLab cannot read it: {' '.join(str(error).split())}") from error
+            raise FileFormatError(f"{path}: MeshLab cannot read it: {in_words(error)}") from error
         if not self.current_mesh().vertex_number():
             raise FileFormatError(f"{path}: no points could be read")
 
@@ -253,23 +225,16 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
             super().save_current_mesh(os.fspath(file_name), *args, **kwargs)
 
     def save(self, path: str | os.PathLike, **options: Any) -> None:
-        """Write the current layer as ``glsk run`` does, complete or not at all: by MeshLab if it has faces.
+        """Write the current layer as ``glsk run`` does, complete or not at all. Options are those of `save_skeleton`.
 
-        Options are those of `save_skeleton`. FileFormatError for an unknown ending.
+        FileFormatError for an unknown ending.
         """
-        layer = self.layer()
-        if layer.faces is None or Path(path).suffix.lower() in (".pcd", ".xyz"):  # which hold no faces
-            layer.save(path, **options)
-            return
-        try:
-            write_atomically(path, lambda temporary: super(MeshSet, self).save_current_mesh(str(temporary)))
-        except pymeshlab.PyMeshLabException as error:
-            raise FileFormatError(f"{path}: MeshLab cannot write it: {' '.join(str(error).split())}") from error
+        self.layer().save(path, **options)
 
     def clear(self) -> None:
         """Remove all layers. The current script stays."""
         super().clear()
-        self._flows = {}
+        self._made = {}
 
 
 def _known(name: Any) -> str:
@@ -290,14 +255,13 @@ def _plain_lengths(params: dict[str, Any]) -> dict[str, Any]:
     return {name: plain(value) for name, value in params.items()}
 
 
-def _method(name: str, doc: str) -> Callable[..., dict[str, Any]]:
+def _method(verb: Verb) -> Callable[..., dict[str, Any]]:
     def apply(self, **params):
-        return self.apply_filter(name, **params)
+        return self.apply_filter(verb.name, **params)
 
-    apply.__name__, apply.__qualname__ = name, f"MeshSet.{name}"
-    apply.__doc__ = f"{doc}\n\nParameters: see ``MeshSet.print_filter_parameter_list({name!r})``.\n"
+    apply.__name__, apply.__qualname__, apply.__doc__ = verb.name, f"MeshSet.{verb.name}", verb.help
     return apply
 
 
 for _verb in verbs().values():
-    setattr(MeshSet, _verb.name, _method(_verb.name, _verb.doc))
+    setattr(MeshSet, _verb.name, _method(_verb))

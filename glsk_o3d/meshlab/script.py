@@ -1,12 +1,10 @@
 """MeshLab's filter scripts (.mlx), read and written without MeshLab."""
 
-import math
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
-from typing import Any
 from xml.parsers import expat
 from xml.sax.saxutils import quoteattr
 
@@ -15,74 +13,25 @@ from ..interop.atomic import write_atomically
 from ..io.paths import existing_file
 
 MOST_BYTES = 1 << 20
-ENCODINGS = ("utf-8", "utf-16", "iso-8859-1", "us-ascii")
-"""Those that expat itself reads: it would leave others to any codec of Python."""
 _ELEMENTS = ("FilterScript", "filter", "Param")  # by depth
 
-BOOL = ("RichBool",)
-INT = ("RichInt", "RichEnum", "RichMesh")
-FLOAT = ("RichFloat", "RichDynamicFloat")
-LENGTH = ("RichAbsPerc", "RichPercentage")
-TEXT = ("RichString", "RichOpenFile", "RichSaveFile", "RichFileOpen", "RichFileSave")
-POINT = ("RichPosition", "RichDirection", "RichPoint3f")
-MATRIX = ("RichMatrix44f", "RichMatrix44")
-_VECTORS = {
-    "RichColor": ("r", "g", "b", "a"),
-    **dict.fromkeys(POINT, ("x", "y", "z")),
-    **dict.fromkeys(MATRIX, tuple(f"val{i}" for i in range(16))),
-}
-"""The attributes of the types that have their value in several."""
+_VALUES = ("value", *"xyz", *"rgba", *(f"val{i}" for i in range(16)))
+"""The attributes that have the value of a parameter: points, colours and matrices have it in several."""
 
 
 @dataclass(frozen=True)
 class Param:
-    """A parameter as it stands in a script: its attributes are text, most types have their value in ``value``."""
+    """A parameter as it stands in a script."""
 
     name: str
     type: str
     attributes: dict[str, str]
     line: int = 0
 
-    def value(self, types: Sequence[str]) -> Any:
-        """A bool, int, float, str, list of floats (of ints for a colour), or for a length a float or text as "2%".
-
-        ValueError if the type is none of those, or what stands there is not of that type.
-        """
-        if self.type not in types:
-            fitting = f"it may be a {' or '.join(types)}" if types else "scripts cannot give it"
-            raise ValueError(f"it has the wrong type {brief(self.type)}: {fitting}")
-        names = _VECTORS.get(self.type, ("value",))
-        if not self.attributes.keys() >= set(names):
-            raise ValueError(f"it has no value: a {self.type} has it in {', '.join(names)}")
-        texts = [self.attributes[name] for name in names]
-        text = texts[0].strip()
-        if self.type in TEXT:
-            return texts[0]
-        if self.type == "RichColor":
-            numbers = [_number(text, int) for text in texts]
-            if not all(0 <= number <= 255 for number in numbers):
-                raise ValueError("a RichColor is of whole numbers from 0 to 255")
-            return numbers
-        if self.type in _VECTORS:
-            return [_number(text, float) for text in texts]
-        if self.type in BOOL:
-            if text.lower() not in ("true", "false"):
-                raise ValueError(f"{brief(text)!r} is neither true nor false")
-            return text.lower() == "true"
-        if self.type in LENGTH and text.endswith("%"):
-            _number(text[:-1], float)
-            return text
-        return _number(text, int if self.type in INT else float)
-
-
-def _number(text: str, kind: type) -> Any:
-    try:
-        number = kind(text.replace("_", "?"))  # Python alone reads 1_0 as 10
-    except ValueError:
-        raise ValueError(f"{brief(text)!r} is not {'an int' if kind is int else 'a number'}") from None
-    if kind is float and not math.isfinite(number):
-        raise ValueError(f"{brief(text)!r} is not finite")
-    return number
+    @property
+    def text(self) -> str:
+        """Its value, of several attributes with commas between them."""
+        return ",".join(self.attributes[name] for name in _VALUES if name in self.attributes).strip()
 
 
 @dataclass(frozen=True)
@@ -98,8 +47,7 @@ def read_script(path: str | os.PathLike) -> list[Call]:
     """The filters of a script, at least one. Whether they exist is not asked here.
 
     FileNotFoundError, or FileFormatError for a folder, a device, or an empty or huge file. ScriptError, with the line,
-    for what is not XML, for elements other than those of a script, and for what scripts never need and attacks do:
-    entities, and a DOCTYPE with declarations or a reference.
+    for what is not XML, for elements other than those of a script, and for entities, which attacks need.
     """
     path = existing_file(path)
     if path.stat().st_size > MOST_BYTES:
@@ -110,16 +58,8 @@ def read_script(path: str | os.PathLike) -> list[Call]:
     def wrong(message: object, line: int | None = None) -> ScriptError:
         return ScriptError(f"{path}, line {line or parser.CurrentLineNumber}: {message}")
 
-    def doctype(name, system, public, has_declarations):
-        if has_declarations or system or public:
-            raise wrong(
-                "the DOCTYPE declares entities or refers to a file, which is refused: it may only be "
-                "<!DOCTYPE FilterScript>"
-            )
-
-    def declaration(version, encoding, standalone):
-        if encoding is not None and encoding.lower() not in ENCODINGS:
-            raise wrong(f"the encoding is {brief(encoding)!r}: must be one of {', '.join(ENCODINGS)}")
+    def entity(name, *_):
+        raise wrong(f"the DOCTYPE declares the entity {brief(name)!r}, which is refused")
 
     def start(element, attributes):
         nonlocal depth
@@ -141,17 +81,14 @@ def read_script(path: str | os.PathLike) -> list[Call]:
         nonlocal depth
         depth -= 1
 
-    parser.XmlDeclHandler = declaration
-    parser.StartDoctypeDeclHandler, parser.StartElementHandler, parser.EndElementHandler = doctype, start, end
+    parser.EntityDeclHandler, parser.StartElementHandler, parser.EndElementHandler = entity, start, end
     try:
         parser.Parse(data, True)
     except expat.ExpatError as error:
         line = min(error.lineno, data.count(b"\n") + 1)
         raise wrong(f"not well-formed XML: {expat.ErrorString(error.code)}", line) from None
-    except ScriptError:
-        raise
-    except (ValueError, LookupError) as error:  # an encoding nobody knows
-        raise wrong(f"cannot be read: {error}", 1) from None
+    except (ValueError, LookupError) as error:  # an encoding nobody knows, but not what is wrong by our own words
+        raise error if isinstance(error, ScriptError) else wrong(f"cannot be read: {error}", 1) from None
     if not calls:
         raise wrong("the script has no filters")
     return calls

@@ -39,19 +39,14 @@ class Step:
             yield
         except GlskError as error:
             place = f"{self.place}: " if self.place else ""
-            slots = self.verb.slots if self.verb is not None else ()
-            cure = next((f"its parameter {name}" for name in slots if name.endswith("drop_invalid")), "")
-            said = str(error).replace("drop_invalid=True", cure or "the Sampler's drop_invalid")
+            said = str(error).replace("drop_invalid=True", "the parameter sampler_drop_invalid")
             raise ScriptError(f"{place}filter {self.call.name!r}: {said}") from error
 
 
 def step(verb: Verb, values: Mapping[str, Any]) -> Step:
-    """One of our filters with its parameters, checked and as it is written into a script.
-
-    `values` are those that differ from the defaults; the script gets all, so that it stays true when defaults change.
-    """
-    params = [verb.slots[name].written(value) for name, value in verb.values(values).items()]
-    return Step(verb.name, dict(values), Call(verb.title, params))
+    """One of our filters with its parameters, checked and as it is written into a script."""
+    verb.plan(values)
+    return Step(verb.name, dict(values), Call(verb.title, [verb.slots[name].written(v) for name, v in values.items()]))
 
 
 def read_steps(path: str | os.PathLike, any_filter: bool = False) -> list[Step]:
@@ -85,36 +80,25 @@ def meshlabs_own(calls: Sequence[Call], path: str | os.PathLike) -> list[Call]:
 
 def _step(call: Call, path: str | os.PathLike, any_filter: bool) -> Step:
     """A filter of a script with its values, all checked."""
-
-    def wrong(message: object, line: int = call.line) -> ScriptError:
-        return ScriptError(f"{path}, line {line}: filter {call.name!r}: {message}")
-
     verb = next((verb for verb in verbs().values() if verb.title == call.name), None)
-    slots: Mapping[str, Any]
-    try:
-        if verb is not None:
-            name, slots, spelled = verb.name, verb.slots, str
-        else:
-            name, spelled = builtin.names()[call.name], builtin.pythonic
-            slots = builtin.slots(name, any_filter)
-    except ValueError as error:
-        raise wrong(error) from None
+    line, about = call.line, ""
     values: dict[str, Any] = {}
-    for param in call.params:
-        slot = slots.get(spelled(param.name))
-        if slot is None:
-            raise wrong(did_you_mean(param.name, slots, "parameter"), param.line)
-        if slot.name in values:
-            raise wrong(f"parameter {param.name!r} is given twice", param.line)
-        try:
-            values[slot.name] = slot.read(param)
-        except ValueError as error:
-            raise wrong(f"parameter {param.name!r}: {error}", param.line) from None
     try:
+        name = verb.name if verb is not None else builtin.names()[call.name]
+        slots: Mapping[str, Any] = verb.slots if verb is not None else builtin.slots(name, any_filter)
+        for param in call.params:
+            line, about = param.line, f"parameter {param.name!r}: "
+            spelled = param.name if verb is not None else builtin.pythonic(param.name)
+            if spelled not in slots:
+                raise ValueError(did_you_mean(param.name, slots, "parameter"))
+            if slots[spelled].name in values:
+                raise ValueError("is given twice")
+            values[slots[spelled].name] = slots[spelled].read(param)
+        line, about = call.line, ""
         if verb is not None:
             verb.plan(values)
-    except InvalidParameterError as error:
-        raise wrong(error) from None
+    except ValueError as error:  # InvalidParameterError, too
+        raise ScriptError(f"{path}, line {line}: filter {call.name!r}: {about}{error}") from None
     return Step(name, values, call, f"{path}, line {call.line}")
 
 

@@ -1,9 +1,9 @@
-"""Our filters as MeshLab's users meet them: a verb for every filter and every edit of skeletons makes a new layer."""
+"""Our filters for MeshLab's users: each verb makes a new layer, by a pipeline or an edit of a skeleton."""
 
 import dataclasses
 import inspect
-import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -12,34 +12,21 @@ import numpy as np
 
 from .. import editing
 from ..analysis.segmentation import segment
-from ..contractor import Contractor
 from ..errors import InvalidCloudError, InvalidParameterError, did_you_mean
 from ..io.colors import shades
 from ..io.formats.graphs import graph_skeleton
-from ..lpr_reducer import LPRReducer
 from ..numerics.vectors import AXES
-from ..parameters import Parameters, parameter, problem_with, resolve_length
-from ..pipeline import Filter, Pipeline, parts
-from ..pipelines import default
+from ..parameters import Parameters, parameter, problem_with, resolve_length, shown
+from ..pipeline import Pipeline, parts
 from ..recipes.catalogue import catalogue, known_pipelines, named_pipeline, serves
-from ..skeleton import Skeleton
-from ..state import Contraction
-from ..thinner import Thinner
 from .layers import Layer
-from .script import BOOL, FLOAT, LENGTH, Param
+from .script import Param
 
 PARTS = ("reducer", "stop")
 OF_FRAME = " of the frame"
 """What follows a percentage that is as everywhere else in this package, of the box that the Sampler's `frame` names."""
-_SLOT_TYPES = {
-    "bool": ("bool", BOOL),
-    "int": ("int", ("RichInt",)),
-    "float": ("float", FLOAT),
-    "length": ("PercentageValue", LENGTH),
-    "choice": ("str", ("RichString", "RichEnum")),
-    "root": ("str", ("RichString", "RichInt", "RichPosition")),
-}
-"""What listings call the types of parameters, and those of scripts, of which the first is written; others are words."""
+RICH_TYPES = {"bool": "RichBool", "int": "RichInt", "float": "RichFloat", "length": "RichAbsPerc"}
+"""What scripts call the types of parameters; others are words, RichString."""
 
 
 def facts_of(doc: str, type: str, choices: tuple[str, ...] = (), low: float | None = None) -> Mapping[str, Any]:
@@ -47,34 +34,18 @@ def facts_of(doc: str, type: str, choices: tuple[str, ...] = (), low: float | No
     return parameter(None, doc, type=type, choices=choices, low=low).metadata
 
 
-_FILTER_STEMS = {
-    "Sampler": "generate_sampled_cloud",
-    "OutlierRemover": "generate_cloud_without_outliers",
-    "Denoiser": "generate_denoised_cloud",
-    "Thinner": "generate_thinned_cloud",
-    "RingBuilder": "generate_one_rings",
-    "Contractor": "generate_contracted_cloud",
-    "LPRReducer": "generate_reduced_cloud",
-    "Connector": "generate_skeleton_graph",
-    "Refiner": "generate_refined_skeleton",
-    "Tracer": "generate_traced_skeleton",
-}
 _EDITS: dict[str, Callable[..., Any]] = {
     "generate_largest_skeleton_component": editing.largest_component,
     "generate_skeleton_without_loops": editing.cut_loops,
     "generate_rerooted_skeleton": editing.reroot,
     "generate_pruned_skeleton": editing.prune,
-    "generate_smoothed_skeleton": editing.smooth,
     "generate_simplified_skeleton": editing.simplify,
 }
 _ROOT = "Where the tree grows from: the lowest vertex along an axis, the thickest end, a vertex, or a point."
 _EDIT_PARAMETERS = {
     "length": facts_of("Least length of a branch that ends, from junction to tip.", "length", low=0),
-    "radius": facts_of("Least mean radius of a branch that ends.", "length", low=0),
     "order": facts_of("Highest order of branches that stays: 0 for the stem alone.", "int?", low=0),
-    "passes": facts_of("How often; more passes make longer waves disappear.", "int", low=0),
-    "tolerance": facts_of("How far a dropped vertex may be from the simpler curve.", "length?", low=0),
-    "n": facts_of("How many vertices to keep, in place of a tolerance.", "int?", low=1),
+    "tolerance": facts_of("How far a dropped vertex may be from the simpler curve.", "length", low=0),
 }
 
 
@@ -106,28 +77,14 @@ class Slot:
             words = [name for name in serving if name != self.option.partition(".")[0]]
         return (*words, *["none"] * self.facts["type"].endswith("?"))
 
-    @property
-    def types(self) -> tuple[str, ...]:
-        """The types that it may have in a script; the first is written."""
-        if self.name == "layer":
-            return ("RichMesh", "RichInt")
-        _, types = _SLOT_TYPES.get(self.kind, ("str", ("RichString",)))
-        worded = self.kind == "length" or self.words
-        return (*types, "RichString") if worded and "RichString" not in types else types
-
     def checked(self, value: Any) -> Any:
         """The value as the filter takes it, reducers and rules made from their names; ValueError if it is wrong."""
-        if isinstance(value, np.generic):
-            value = value.item()
-        if isinstance(value, list | tuple | np.ndarray) and self.kind == "root":
-            value = ",".join(map(str, np.ravel(value).tolist()))
+        value = _plain(value)
         if value == "none" and "none" in self.words:
             return None
         if self.kind == "length" and self.option and isinstance(value, str):  # filters alone know the frame
             value = value.removesuffix(OF_FRAME)
-        if self.kind == "choice" and type(value) is int:
-            if not 0 <= value < len(self.words):
-                raise ValueError(f"must be one of {', '.join(map(repr, self.words))}, or its number from 0")
+        if self.kind == "choice" and type(value) is int and 0 <= value < len(self.words):
             value = self.words[value]
         if self.kind in PARTS and isinstance(value, str):
             if value not in self.words:
@@ -136,10 +93,8 @@ class Slot:
         if self.kind == "root" and str(value).isdecimal():
             return int(value)
         wrong = problem_with(value, self.facts)
-        if wrong and self.kind == "root":
-            wrong += ", or the number of a vertex"
         if wrong:
-            raise ValueError(wrong)
+            raise ValueError(wrong + ", or the number of a vertex" * (self.kind == "root"))
         return value
 
     def is_of_box(self, value: Any) -> bool:
@@ -148,27 +103,36 @@ class Slot:
 
     def read(self, param: Param) -> Any:
         """The value of a parameter in a script, checked but not resolved; ValueError if it is wrong."""
-        value = param.value(self.types)
-        self.checked(value)
+        value: Any = param.text
+        if self.kind == "bool":
+            value = {"true": True, "false": False}.get(value.lower(), value)
+        elif self.kind != "root":
+            for number in (int, float) if self.kind in ("float", "length") else (int,):
+                with suppress(ValueError):
+                    value = number(param.text)
+                    break
+        try:
+            self.checked(value)
+        except ValueError as error:
+            raise ValueError(f"{error}, not {shown(value)}") from None
         return value
 
     def written(self, value: Any) -> Param:
         """The parameter in a script."""
+        value = _plain(value)
         if isinstance(value, Parameters | None):
             value = "none" if value is None else type(value).__name__
         text = str(value).lower() if isinstance(value, bool) else value if isinstance(value, str) else repr(value)
         worded = isinstance(value, str) and not self.is_of_box(value)
-        return Param(self.name, "RichString" if worded else self.types[0], {"value": text})
+        kind = "RichMesh" if self.name == "layer" else RICH_TYPES.get(self.kind, "RichString")
+        return Param(self.name, "RichString" if worded else kind, {"value": text})
 
-    def listing(self, default: Any) -> str:
-        """Two lines as MeshLab prints them, with limits and meaning."""
-        kind, _ = _SLOT_TYPES.get(self.kind, ("str", ()))
-        limits = {"above" if self.facts["open_low"] else "min": self.facts["low"], "max": self.facts["high"]}
-        limits = {key: limit for key, limit in limits.items() if limit is not None}
-        said = f" [{'; '.join(f'{key}: {limit:g}' for key, limit in limits.items())}]" if limits else ""
-        said += f" ({', '.join(self.words)})" if self.words else ""
-        kind += " or str" if self.words and kind != "str" else ""
-        return f"\t{self.name} : {kind} = {default}{said}\n\t\t{self.facts['doc']}"
+
+def _plain(value: Any) -> Any:
+    """A value without NumPy: a point as text."""
+    if isinstance(value, list | tuple) or np.ndim(value):
+        return ",".join(map(str, np.ravel(value).tolist()))
+    return value.item() if isinstance(value, np.generic | np.ndarray) else value
 
 
 @dataclass(frozen=True)
@@ -181,6 +145,12 @@ class Verb:
     slots: dict[str, Slot]
     makes: str  # what the result may be, as `check_ending` has it
 
+    @property
+    def help(self) -> str:
+        """What it does, and what its parameters mean."""
+        meanings = [f"{name} : {slot.facts['doc']}" for name, slot in self.slots.items()]
+        return "\n".join([self.doc, "", *meanings])
+
     def checked(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """The given parameters as they are taken; InvalidParameterError for a name or a value that is wrong."""
         made = {}
@@ -192,11 +162,6 @@ class Verb:
             except ValueError as error:
                 raise InvalidParameterError(f"{name} = {value!r}: {error}") from None
         return made
-
-    def values(self, given: Mapping[str, Any]) -> dict[str, Any]:
-        """All parameters that matter, the given ones and the defaults of the others."""
-        made = self.checked(given)
-        return {name: made.get(name, slot.default) for name, slot in self.slots.items()}
 
     def in_units(self, values: Mapping[str, Any], diagonal: float) -> dict[str, Any]:
         """Parameters with lengths in place of the percentages of a layer's diagonal."""
@@ -218,67 +183,23 @@ class Verb:
 
 @dataclass(frozen=True)
 class PipelineVerb(Verb):
-    """A named pipeline, or one filter of it, run on the vertices of a layer: a cloud, a mesh, or what a filter made.
-
-    What must run before the one filter runs first, unless the layer comes from there.
-    """
-
-    filter: type[Filter] | None = None
+    """A named pipeline, run on the vertices of a layer: a cloud or a mesh."""
 
     def plan(self, values: Mapping[str, Any]) -> Pipeline:
-        """The filters that the verb runs with such parameters; refuses those of a filter that is not among them."""
+        """The pipeline with such parameters; refuses those of a filter that is not in it."""
         made = self.checked(values)
-        if self.filter is None:
-            start = named_pipeline(values.get("pipeline", "default"))
-        else:
-            start = Pipeline(*([stage for stage in default().stages if type(stage) is self.filter] or [self.filter()]))
         names = {self.slots[name].option: name for name in made if self.slots[name].option}
         try:
+            start = named_pipeline(made.get("pipeline", "default"))
             return start.with_options({option: made[name] for option, name in names.items()})
         except InvalidParameterError as error:  # say it with the name that the verb has for it
             option, colon, why = str(error).partition(": ")
             raise InvalidParameterError(f"{names.get(option, option)}{colon}{why}") from None
 
-    def values(self, given: Mapping[str, Any]) -> dict[str, Any]:
-        """As of every verb. A percentage that was not given says that it is the filter's: ``"1% of the frame"``."""
-        own, found = super().values(given), {}
-        present = {type(part).__name__: part for part in parts(self.plan(given))}
-        for slot in self.slots.values():
-            holder, _, field = slot.option.partition(".")
-            if not holder:
-                found[slot.name] = own[slot.name]
-            elif holder in present:
-                value = getattr(present[holder], field)
-                if slot.is_of_box(value) and not slot.is_of_box(given.get(slot.name)):
-                    value += OF_FRAME
-                found[slot.name] = slot.written(value).attributes["value"] if slot.kind in PARTS else value
-        return found
-
     def run(self, layer, given, on_iteration=None):
         # a layer without extent is refused by the Sampler, in better words than a length of 0
         pipeline = self.plan(self.in_units(given, layer.diagonal or 1.0))
-        if self.filter is not None and layer.holds(self.filter.consumes):
-            return self.shown(pipeline(layer.flow, on_iteration=on_iteration), layer.source or layer)
-        pipeline = Pipeline(*self._before(), *pipeline.stages)
         return self.shown(pipeline(layer.cloud(), on_iteration=on_iteration), layer)
-
-    def _before(self) -> tuple[Filter, ...]:
-        """What turns a cloud into what the filter takes: the default pipeline's filters before it."""
-        stages, kinds = default().stages, [type(stage) for stage in default().stages]
-        if self.filter in kinds:
-            return stages[: kinds.index(self.filter)]
-        if self.filter is not None and self.filter.consumes is Contraction:
-            whole = [stage for stage in stages[: kinds.index(Contractor)] if not isinstance(stage, Thinner)]
-            return (*whole, Contractor(max_iterations=1))
-        return stages if self.filter is not None and self.filter.consumes is Skeleton else ()
-
-    def shown(self, result, source):
-        layer = super().shown(result, source)
-        if self.filter is not LPRReducer:
-            return layer
-        kept = result.point_of_survivor  # a reduction is seen best where the points were
-        normals, colors = (None if each is None else each[kept] for each in (source.normals, source.colors))
-        return dataclasses.replace(layer, vertices=result.points[kept], normals=normals, colors=colors)
 
 
 @dataclass(frozen=True)
@@ -286,8 +207,9 @@ class SegmentVerb(PipelineVerb):
     """Points labelled by the branch of the skeleton that they belong to."""
 
     def run(self, layer, given, on_iteration=None):
-        if layer.holds(Skeleton):
-            skeleton, layer = layer.flow, layer.source or layer
+        skeleton = layer.skeleton
+        if skeleton is not None and len(skeleton.points):
+            layer = layer.source or layer
         else:
             skeleton = self.plan(given)(layer.cloud(), on_iteration=on_iteration)
         labels = segment(skeleton)
@@ -308,7 +230,8 @@ class EditVerb(Verb):
     function: Callable[..., Any]
 
     def plan(self, values):
-        made = self.values(values)
+        defaults = {name: slot.default for name, slot in self.slots.items()}
+        made = {**defaults, **self.checked(values)}
         del made["layer"]
         # tried on a line, since the function knows best what goes together; which vertices there are nobody knows yet
         line = graph_skeleton(np.eye(2, 3), [[0, 1]], np.ones(2))
@@ -332,10 +255,7 @@ class EditVerb(Verb):
 
 @cache
 def verbs() -> dict[str, Verb]:
-    """Our filters for MeshLab by their names in Python.
-
-    The whole pipeline first, then each filter of the catalogue, the segmentation, and what changes skeletons.
-    """
+    """Our filters for MeshLab by their names in Python: the pipelines, the segmentation, and what changes skeletons."""
     whole = "The curve skeleton of the current layer's vertices, with radii as scalars."
     segmented = (
         "The points that a skeleton was made from, with the branch that each belongs to as scalar and as colour. "
@@ -343,7 +263,6 @@ def verbs() -> dict[str, Verb]:
     )
     found = [
         _verb(PipelineVerb, "generate_curve_skeleton", whole, _slots_of_all(), "skeleton"),
-        *(_filter_verb(cls) for cls in catalogue().values() if issubclass(cls, Filter)),
         _verb(SegmentVerb, "generate_segmented_cloud", segmented, [], "points or mesh"),
         *(_edit_verb(stem, function) for stem, function in _EDITS.items()),
     ]
@@ -362,27 +281,12 @@ def _slots_of_all() -> list[Slot]:
     choice = facts_of(about, "choice", tuple(known_pipelines()))
     inside = [type(part) for make in known_pipelines().values() for part in parts(make())]
     inside += [cls for cls in catalogue().values() if any(serves(cls, kind) for kind in PARTS)]
-    prefixed = [slot for cls in dict.fromkeys(inside) for slot in _slots(cls, f"{cls.__name__.lower()}_")]
+    prefixed = (
+        Slot(f"{cls.__name__.lower()}_{field.name}", field.metadata, f"{cls.__name__}.{field.name}")
+        for cls in dict.fromkeys(inside)
+        for field in dataclasses.fields(cls)  # type: ignore[arg-type]
+    )
     return [Slot("pipeline", choice, default="default"), *prefixed]
-
-
-def _filter_verb(cls: type[Filter]) -> Verb:
-    """The verb of a filter, which has its parameters and those of what may be inside it."""
-    slots = list(_slots(cls))
-    kinds = {slot.kind for slot in slots} & set(PARTS)
-    for part in catalogue().values():
-        if part is not cls and any(serves(part, kind) for kind in kinds):
-            slots += _slots(part, f"{part.__name__.lower()}_")
-    words = "_".join(re.findall(r"[A-Z]+(?![a-z])|[A-Z][a-z0-9]*", cls.__name__)).lower()
-    stem = _FILTER_STEMS.get(cls.__name__, f"generate_by_{words}")
-    makes = "skeleton" if cls.produces is Skeleton else "points"
-    return _verb(PipelineVerb, stem, _summary(cls) or cls.__name__, slots, makes, cls)
-
-
-def _slots(cls: type[Parameters], prefix: str = "") -> Iterator[Slot]:
-    """A slot for each parameter of a filter, reducer or rule."""
-    for field in dataclasses.fields(cls):  # type: ignore[arg-type]
-        yield Slot(prefix + field.name, field.metadata, f"{cls.__name__}.{field.name}")
 
 
 def _edit_verb(stem: str, function: Callable[..., Any]) -> Verb:

@@ -1,12 +1,17 @@
 """Cycles of a graph embedded in space, and how wide they open."""
 
 from collections.abc import Iterator
+from typing import TypeAlias
 
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from .paths import maximal_paths
 from .vectors import TINY, dot
+
+Chain: TypeAlias = tuple[float, list[int]]
+"""The length of a path and its vertices."""
 
 
 def minimum_cycle_basis(n: int, edges: np.ndarray, lengths: np.ndarray) -> list[np.ndarray]:
@@ -16,55 +21,26 @@ def minimum_cycle_basis(n: int, edges: np.ndarray, lengths: np.ndarray) -> list[
     count as one edge, and trees that hang on the graph are cut off first: the cost depends on the junctions in the
     cyclic part alone.
     """
-    chains, chain_lengths = _cyclic_chains(n, edges, lengths)
-    if not chains:
-        return []
-    cycles = []
-    plain = []
-    for chain, length in zip(chains, chain_lengths, strict=True):
-        if chain[0] == chain[-1]:
-            cycles.append((length, chain[:-1]))
-        else:
-            plain.append((length, chain))
-    cycles += _horton(plain)
+    chains = _cyclic_chains(n, edges, lengths)
+    cycles = [(length, chain[:-1]) for length, chain in chains if chain[0] == chain[-1]]
+    cycles += _horton([(length, chain) for length, chain in chains if chain[0] != chain[-1]])
     return [np.array(vertices) for _, vertices in sorted(cycles, key=lambda cycle: cycle[0])]
 
 
-def _cyclic_chains(n: int, edges: np.ndarray, lengths: np.ndarray) -> tuple[list[list[int]], list[float]]:
-    """Paths between junctions of the cyclic part: vertex lists and lengths. A ring of its own starts anywhere."""
-    around = [{} for _ in range(n)]
-    for (a, b), length in zip(edges.tolist(), lengths.tolist(), strict=True):
-        around[a][b] = around[b][a] = length
-    leaves = [v for v in range(n) if len(around[v]) == 1]
-    while leaves:
-        v = leaves.pop()
-        for u in around[v]:
-            del around[u][v]
-            if len(around[u]) == 1:
-                leaves.append(u)
-        around[v] = {}
-    chains, total = [], []
-    degree = [len(links) for links in around]
-    for start in sorted((v for v in range(n) if degree[v]), key=lambda v: degree[v] == 2):
-        for step in list(around[start]):
-            if step not in around[start]:
-                continue  # walked from its other end
-            chain, length = [start], 0.0
-            here, ahead = start, step
-            while True:
-                length += around[here].pop(ahead)
-                del around[ahead][here]
-                chain.append(ahead)
-                if ahead == start or degree[ahead] > 2:
-                    break
-                here, ahead = ahead, next(iter(around[ahead]))
-            chains.append(chain)
-            total.append(length)
-    return chains, total
+def _cyclic_chains(n: int, edges: np.ndarray, lengths: np.ndarray) -> list[Chain]:
+    """Paths between junctions of the cyclic part. A ring of its own starts anywhere."""
+    while True:
+        paths = maximal_paths(n, edges)
+        degree = np.bincount(edges.ravel(), minlength=n)
+        cyclic = [(vertices, path) for vertices, path in paths if degree[[vertices[0], vertices[-1]]].min() > 1]
+        if len(cyclic) == len(paths):
+            return [(float(np.cumsum(lengths[path])[-1]), vertices) for vertices, path in paths]
+        left = np.sort(np.concatenate([np.empty(0, int), *(path for _, path in cyclic)]))
+        edges, lengths = edges[left], lengths[left]
 
 
-def _horton(chains: list[tuple[float, list[int]]]) -> list[tuple[float, list[int]]]:
-    """Minimum cycle basis of the multigraph of chains between different junctions: [(length, vertices)]."""
+def _horton(chains: list[Chain]) -> list[Chain]:
+    """Minimum cycle basis of the multigraph of chains between different junctions."""
     if not chains:
         return []
     junctions = sorted({v for _, chain in chains for v in (chain[0], chain[-1])})

@@ -78,14 +78,13 @@ def delaunay_star(offsets: np.ndarray, valid: np.ndarray | None = None) -> tuple
     # Cut the walk at the origin, where it meets it.
     size = (walk >= 0).sum(axis=1)
     size[~usable.any(axis=1)] = 0
-    at_origin = walk == k
-    closed = ~at_origin.any(axis=1) & (size > 2)
-    cut = np.where(at_origin.any(axis=1), np.argmax(at_origin, axis=1) + 1, 0)
-    length = size - at_origin.any(axis=1)
+    meets = (walk == k).any(axis=1)
+    cut = np.where(meets, np.argmax(walk == k, axis=1) + 1, 0)
+    length = size - meets
     column = np.arange(max(length.max(initial=0), 1))
     source = (cut[:, None] + column) % np.maximum(size, 1)[:, None]
     ring = np.where(column < length[:, None], np.take_along_axis(walk, source, axis=1), -1)
-    return ring, closed
+    return ring, ~meets & (size > 2)
 
 
 def _seen(q: np.ndarray, line: np.ndarray, here: np.ndarray, ahead: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

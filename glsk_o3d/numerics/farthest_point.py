@@ -6,28 +6,25 @@ from scipy.spatial import cKDTree
 from .vectors import norm
 
 
-def farthest_point_sampling(
-    points: np.ndarray, radius: np.ndarray, start: int | None = None
-) -> tuple[np.ndarray, np.ndarray]:
+def farthest_point_sampling(points: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Sample points until every one lies in the ball of a sample: each is the point farthest from those before.
 
     Distances from a sample count in units of its own `radius` (n,), so that samples are dense where the radii are
     small. The first sample is the point farthest from the centroid, which depends neither on the order of the points
-    nor on how they are turned, or `start`. Returns the samples (m,) in the order taken, and for every point the
-    position of the sample nearest to it, (n,).
+    nor on how they are turned. Returns the samples (m,) in the order taken, and for every point the position of the
+    sample nearest to it, (n,).
     """
     tree = cKDTree(points)
     nearest = np.full(len(points), np.inf)
     representative = np.zeros(len(points), int)
-    sample = int(np.argmax(((points - points.mean(axis=0)) ** 2).sum(axis=1))) if start is None else start
+    sample = int(np.argmax(((points - points.mean(axis=0)) ** 2).sum(axis=1)))
     samples = []
     while nearest[sample] > 1:
         # Only points nearer to the new sample than the farthest point is to the old ones can change hands.
         reach = nearest[sample]
-        ball = (
-            np.arange(len(points)) if np.isinf(reach) else tree.query_ball_point(points[sample], reach * radius[sample])
-        )
-        ball = np.asarray(ball)
+        ball = np.arange(len(points))
+        if samples:
+            ball = np.array(tree.query_ball_point(points[sample], reach * radius[sample]))
         distance = norm(points.take(ball, axis=0) - points[sample]) / radius[sample]
         closer = distance < nearest[ball]
         nearest[ball[closer]] = distance[closer]

@@ -74,15 +74,6 @@ class Frame:
         return points * self.scale + self.centre
 
 
-def finite_points(points: np.ndarray, drop: bool) -> np.ndarray:
-    """Which points have finite coordinates, (N,) bool; InvalidCloudError for the others, if they may not `drop`."""
-    finite = np.isfinite(points).all(axis=1)
-    dropped = int(len(points) - finite.sum())
-    if dropped and not drop:
-        raise not_finite(dropped, len(points), int(np.argmin(finite)))
-    return finite
-
-
 def not_finite(n: int, total: int, first: int) -> InvalidCloudError:
     """The error for n of all points, the first at an index, that have no finite coordinates."""
     if n == total:

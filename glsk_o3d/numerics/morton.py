@@ -5,6 +5,7 @@ import numpy as np
 from .vectors import TINY
 
 MORTON_BITS = 21  # derived: per axis: 63 bits in all
+FINEST_CELLS = 2**MORTON_BITS - 1  # derived: cells along the longest side of the finest grid
 
 
 def morton_order(points: np.ndarray) -> np.ndarray:
@@ -13,7 +14,7 @@ def morton_order(points: np.ndarray) -> np.ndarray:
     Points in one cell of it are sorted by their coordinates, so that the order says nothing of the one before; only
     equal points keep theirs.
     """
-    codes = morton_codes(points, 2**MORTON_BITS - 1)
+    codes = morton_codes(points, FINEST_CELLS)
     return sort_within(points, codes, np.argsort(codes, kind="stable"))
 
 

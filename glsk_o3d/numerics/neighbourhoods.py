@@ -1,5 +1,6 @@
 """Nearest neighbours and how they are spread."""
 
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 
@@ -8,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from .cores import threads
 from .eigen import principal_parts
-from .vectors import PAIRS, TINY, dot, unit
+from .vectors import PAIRS, dot, unit
 
 THREAD_POINTS = 4096  # speed: points whose neighbours are worth a thread
 SCATTER_CHUNK = 4096  # speed: rows at a time: the (3, rows, k) work array then stays in the cache
@@ -107,10 +108,19 @@ def principal(points: np.ndarray, neighbours: np.ndarray) -> tuple[np.ndarray, n
     return np.maximum(values.T, 0), normals
 
 
-def sphericity(spread: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
-    """Least over largest principal spread, smoothed by the median, (n,): 0 on a plane or a line, 1 in a ball."""
-    ratio = spread[:, 0] / np.maximum(spread[:, 2], TINY)
-    return row_medians(ratio.take(neighbours))
+def wide_covariances(
+    points: np.ndarray, average: Callable[[np.ndarray], np.ndarray], times: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Covariances of wider surroundings: what `average` makes of the first and second moments, again and again.
+
+    It takes (n, c) float arrays to means over the surroundings of each point. Two (6, n) float arrays as of `scatter`:
+    the covariances, and the means of the squares and products that they are the difference of.
+    """
+    moments = np.stack([*points.T, *(points[:, i] * points[:, j] for i, j in PAIRS)], axis=1)
+    for _ in range(times):
+        moments = average(moments)
+    mean, square = moments[:, :3].T, moments[:, 3:].T
+    return square - [mean[i] * mean[j] for i, j in PAIRS], square
 
 
 def uprightness(points: np.ndarray, normals: np.ndarray, p: np.ndarray, q: np.ndarray) -> np.ndarray:

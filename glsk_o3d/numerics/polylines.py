@@ -30,12 +30,12 @@ def relative_distance(
     """
     a, b = (np.concatenate([path[part] for path in paths]) for part in (slice(-1), slice(1, None)))
     start, step = vertices[a], vertices[b] - vertices[a]
-    length, tiny = norm(step), TINY
-    direction = step / np.maximum(length, tiny)[:, None]
+    length = norm(step)
+    direction = step / np.maximum(length, TINY)[:, None]
     # relative to one of them: products of coordinates far from the origin would cancel
     points, start = points - start[0], start - start[0]
     size = max(np.abs(points).max(), np.abs(start).max())
-    least = max(np.finfo(float).eps * size, tiny)  # of a line, which has no thickness but roundings
+    least = max(np.finfo(float).eps * size, TINY)  # of a line, which has no thickness but roundings
     ratio, nearest = np.empty(len(points)), np.empty(len(points))
     rows = max(POLYLINE_CHUNK // len(a), 1)
     for first in range(0, len(points), rows):
@@ -44,7 +44,7 @@ def relative_distance(
         squared = (p**2).sum(axis=1)[:, None] - 2 * p @ start.T + (start**2).sum(axis=1)
         foot = np.clip(along, 0, length)
         distance = np.sqrt(np.maximum(squared + foot * (foot - 2 * along), 0))
-        there = np.maximum(surface[a] + foot / np.maximum(length, tiny) * (surface[b] - surface[a]), least)
+        there = np.maximum(surface[a] + foot / np.maximum(length, TINY) * (surface[b] - surface[a]), least)
         over = distance / there
         edge = over.argmin(axis=1)[:, None]
         ratio[first : first + rows] = np.take_along_axis(over, edge, axis=1)[:, 0]

@@ -144,12 +144,9 @@ class Rings:
     def concatenate(cls, parts: Sequence[Rings]) -> Rings:
         """One Rings from several, in order."""
         sizes = np.concatenate([np.zeros(1, int), *(part.sizes for part in parts)])
-        none = [np.empty(0, int)]
-        return cls(
-            np.cumsum(sizes),
-            np.concatenate([part.indices for part in parts] or none),
-            np.concatenate([part.closed for part in parts] or [np.empty(0, bool)]),
-        )
+        indices = np.concatenate([np.empty(0, int), *(part.indices for part in parts)])
+        closed = np.concatenate([np.empty(0, bool), *(part.closed for part in parts)])
+        return cls(np.cumsum(sizes), indices, closed)
 
 
 def star_rings(points: np.ndarray, centres: np.ndarray, neighbours: np.ndarray, axes: np.ndarray) -> Rings:

@@ -7,6 +7,5 @@ be ``"extends"``, the name of a pipeline, and ``"set"``, changes to it by filter
 """
 
 from .recipe import RECIPE_ENDINGS, from_recipe, load_recipe, save_recipe, to_recipe
-from .rerun import rerun
 
-__all__ = ["RECIPE_ENDINGS", "from_recipe", "load_recipe", "rerun", "save_recipe", "to_recipe"]
+__all__ = ["RECIPE_ENDINGS", "from_recipe", "load_recipe", "save_recipe", "to_recipe"]

@@ -48,7 +48,7 @@ def known_pipelines() -> dict[str, Callable[[], Pipeline]]:
 
 
 def named_pipeline(name: str) -> Pipeline:
-    """The pipeline of that name, built in or of a plugin.
+    """The pipeline of that name, built in or of a plugin; InvalidParameterError suggests one if there is none.
 
     Parameters
     ----------
@@ -57,11 +57,6 @@ def named_pipeline(name: str) -> Pipeline:
     Returns
     -------
     Pipeline
-
-    Raises
-    ------
-    InvalidParameterError
-        There is none; the message suggests one, or lists the names.
     """
     make = PIPELINES.get(name) or known_pipelines().get(name)
     if make is None:

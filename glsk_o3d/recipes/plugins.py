@@ -2,15 +2,15 @@
 
 import dataclasses
 import sys
-import threading
 import warnings
 from contextlib import redirect_stdout
+from importlib.metadata import EntryPoint
 from typing import Any
 
 from ..errors import PluginWarning
 from ..interop.clouds import Cloud
 from ..interop.packages import FILTER_GROUP, entry_points
-from ..parameters import RESERVED_WORDS, TYPES, Parameters
+from ..parameters import RESERVED_WORDS, Parameters
 from ..pipeline import FLOWS, Filter, Pipeline
 from ..pipelines import BUILTIN, PIPELINES
 from ..report import outside
@@ -23,7 +23,6 @@ class _Unfit(Exception):
 
 
 _found: dict[str, dict[str, Any]] = {}
-_lock = threading.RLock()
 
 
 def plugins(group: str) -> dict[str, Any]:
@@ -31,44 +30,39 @@ def plugins(group: str) -> dict[str, Any]:
 
     A PluginWarning says once of each that is broken what is wrong; it is left out, and the others are not.
     """
-    builtin, check = (BUILTIN, _check_filter) if group == FILTER_GROUP else (PIPELINES, _check_pipeline)
-    with _lock:
-        if group not in _found:
-            found = _found[group] = {}  # already there for plugins that themselves ask for plugins
+    if group not in _found:
+        found = _found[group] = {}  # already there for plugins that themselves ask for plugins
+        problems: list[str] = []
+        for entry in entry_points(group, problems):
             try:
-                problems = _load(group, builtin, check, found)
-            except BaseException:  # interrupted: next time from the start
-                del _found[group]
+                found[entry.name] = _load(entry, group, found)
+            except KeyboardInterrupt:
+                del _found[group]  # next time from the start
                 raise
-            for problem in problems:
-                warnings.warn(problem, PluginWarning, stacklevel=outside())
-        return _found[group]
+            except BaseException as error:  # whatever code of others raises; some is no Exception
+                cause = str(error) if isinstance(error, _Unfit) else f"{type(error).__name__}: {error}"
+                package = f"{entry.dist.name} {entry.dist.version}" if entry.dist else "an unknown package"
+                problems.append(f"plugin {entry.name!r} ({entry.value}) of {package} left out: {cause}")
+        for problem in problems:
+            warnings.warn(problem, PluginWarning, stacklevel=outside())
+    return _found[group]
 
 
 def forget_plugins() -> None:
     """Search for plugins again at the next use, after one was installed into a running process."""
-    with _lock:
-        _found.clear()
+    _found.clear()
 
 
-def _load(group, builtin, check, found):
-    """Fill `found` with plugins; gives what is wrong with the others."""
-    problems: list[str] = []
-    for distribution, entry in entry_points(group, problems):
-        try:
-            if entry.name in builtin or entry.name in found:
-                owner = "the built-in one" if entry.name in builtin else "one of another plugin"
-                raise _Unfit(f"the name is that of {owner}")
-            with redirect_stdout(sys.stderr):  # where there are results of commands, nothing else may be
-                plugin = entry.load()
-                check(entry.name, plugin)
-            found[entry.name] = plugin
-        except KeyboardInterrupt:
-            raise
-        except BaseException as error:  # whatever code of others raises; some is no Exception
-            cause = str(error) if isinstance(error, _Unfit) else f"{type(error).__name__}: {error}"
-            problems.append(f"plugin {entry.name!r} ({entry.value}) of {distribution} left out: {cause}")
-    return problems
+def _load(entry: EntryPoint, group: str, found: dict[str, Any]) -> Any:
+    """What an entry point names; _Unfit, or whatever its code raises, if it cannot be used."""
+    builtin: Any = BUILTIN if group == FILTER_GROUP else PIPELINES
+    if entry.name in builtin or entry.name in found:
+        owner = "the built-in one" if entry.name in builtin else "one of another plugin"
+        raise _Unfit(f"the name is that of {owner}")
+    with redirect_stdout(sys.stderr):  # where there are results of commands, nothing else may be
+        plugin = entry.load()
+        (_check_filter if group == FILTER_GROUP else _check_pipeline)(entry.name, plugin)
+    return plugin
 
 
 def _check_filter(name: str, cls: Any) -> None:
@@ -78,26 +72,18 @@ def _check_filter(name: str, cls: Any) -> None:
     if cls.__name__ != name:
         raise _Unfit(f"the entry point must have the name of the class, {cls.__name__!r}")
     for field in dataclasses.fields(cls):  # type: ignore[arg-type]
-        if "type" not in field.metadata:
-            raise _Unfit(f"its field {field.name!r} is not made by glsk_o3d.parameters.parameter")
-        if field.name in RESERVED_WORDS:
-            raise _Unfit(f"recipes have another meaning for a parameter {field.name!r}")
-        if str(field.metadata["type"]).removesuffix("?") not in TYPES:
-            raise _Unfit(f"its parameter {field.name!r} has a type that is none of {', '.join(TYPES)}")
-        if field.metadata["type"].endswith("?") and "none" in field.metadata["choices"]:
-            raise _Unfit(f"the choice 'none' of its parameter {field.name!r} cannot be told from None")
+        if "type" not in field.metadata or field.name in RESERVED_WORDS:
+            raise _Unfit(
+                f"its field {field.name!r} is not made by glsk_o3d.parameters.parameter, or recipes use its name"
+            )
     if not issubclass(cls, Filter):
         if not callable(cls()):
             raise _Unfit("a stopping rule must be callable")
     elif cls.consumes not in FLOWS or cls.produces not in FLOWS or (cls.produces is Cloud is not cls.consumes):
-        raise _Unfit(f"there is no filter from {_flow(cls.consumes)} to {_flow(cls.produces)}")
+        raise _Unfit(f"there is no filter from {cls.consumes} to {cls.produces}")
     elif cls._run is Filter._run:
         raise _Unfit("it has no method _run")
     cls().check()
-
-
-def _flow(flow: Any) -> str:
-    return getattr(flow, "__name__", repr(flow))
 
 
 def _check_pipeline(name: str, make: Any) -> None:

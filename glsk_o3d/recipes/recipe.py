@@ -4,14 +4,13 @@ import dataclasses
 import json
 import os
 import sys
-from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
-from ..errors import InvalidParameterError, RecipeError, brief, did_you_mean
+from ..errors import InvalidParameterError, RecipeError, did_you_mean
 from ..interop.atomic import write_atomically
 from ..parameters import FROM, NONE, UNWRITTEN, Parameters, problem_with, shown
 from ..pipeline import RECIPE_VERSION, Pipeline, recipe_of
@@ -53,36 +52,8 @@ def to_recipe(pipeline: Pipeline) -> dict[str, Any]:
     """
     pipeline.check()
     recipe = recipe_of(*(stage.table() for stage in pipeline.stages))
-    for i, stage in enumerate(pipeline.stages):
-        _refuse_unknown(stage, f"pipeline[{i}]")
-    _refuse_gaps(recipe)
+    from_recipe(recipe)  # refuses what it could not make again
     return recipe
-
-
-def _refuse_gaps(value: Any, path: str = "") -> None:
-    """Raise RecipeError, with its path, for what a recipe says that it could not hold."""
-    if isinstance(value, dict) and UNWRITTEN in value:
-        raise RecipeError(f"{path}: a recipe cannot hold it: {value[UNWRITTEN]}")
-    if isinstance(value, dict):
-        for key, item in value.items():
-            _refuse_gaps(item, f"{path}.{key}" if path else str(key))
-    elif isinstance(value, list):
-        for i, item in enumerate(value):
-            _refuse_gaps(item, f"{path}[{i}]")
-
-
-def _refuse_unknown(part: Parameters, path: str) -> None:
-    """Raise RecipeError if a filter or rule, or one inside it, is none that a recipe could name."""
-    cls = type(part)
-    if find(cls.__name__) is not cls:
-        name = f"{cls.__module__}.{cls.__qualname__}"
-        raise RecipeError(
-            f"{path}: a recipe cannot hold it: {name} is not among the filters and rules of 'glsk filters'"
-        )
-    for field in dataclasses.fields(part):  # type: ignore[arg-type]
-        value = getattr(part, field.name)
-        if isinstance(value, Parameters):
-            _refuse_unknown(value, f"{path}.{field.name}")
 
 
 def save_recipe(pipeline: Pipeline, path: str | os.PathLike) -> None:
@@ -96,10 +67,8 @@ def save_recipe(pipeline: Pipeline, path: str | os.PathLike) -> None:
 
     Raises
     ------
-    InvalidParameterError, RecipeError
-        See `to_recipe`; or the ending is unknown.
-    OSError
-        The file cannot be written.
+    InvalidParameterError, RecipeError, OSError
+        See `to_recipe`; or the ending is unknown, or the file cannot be written.
 
     Examples
     --------
@@ -117,7 +86,6 @@ def save_recipe(pipeline: Pipeline, path: str | os.PathLike) -> None:
 
 
 def _ending(path: str | os.PathLike) -> str:
-    """The ending of a recipe's file name; RecipeError for another one."""
     ending = Path(path).suffix.lower()
     if ending not in RECIPE_ENDINGS:
         raise RecipeError(f"{os.fspath(path)}: unknown ending; recipes are {' or '.join(RECIPE_ENDINGS)} files")
@@ -130,7 +98,7 @@ def load_recipe(path: str | os.PathLike) -> Pipeline:
     Parameters
     ----------
     path : path-like
-        JSON or TOML, by the ending.
+        JSON or TOML, by the ending; or the JSON of a result, which holds the recipe that made it.
 
     Returns
     -------
@@ -138,41 +106,31 @@ def load_recipe(path: str | os.PathLike) -> Pipeline:
 
     Raises
     ------
-    OSError
-        The file cannot be read.
-    RecipeError
-        The file is no valid recipe; the message names the file and the place in it.
+    RecipeError, OSError
+        The file is no valid recipe, or cannot be read; the message names the file and the place in it.
 
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
     ...     path = Path(folder, "mine.json")
-    ...     _ = path.write_text('{"glsk_o3d": {"version": 1}, "extends": "default", "set": {"RingBuilder": {"k": 12}}}')
-    ...     load_recipe(path).stages[4].k
-    12
+    ...     _ = path.write_text('{"glsk_o3d": {"version": 1}, "extends": "cao2010"}')
+    ...     load_recipe(path) == named_pipeline("cao2010")
+    True
     """
     ending = _ending(path)
-    if os.path.exists(path) and not os.path.isfile(path):
-        raise RecipeError(f"{os.fspath(path)}: is a folder, a pipe or a device, not a file")
     data = Path(path).read_bytes()
     try:
         text = data.decode("utf-8-sig")
-        recipe = json.loads(text, object_pairs_hook=_table) if ending == ".json" else tomllib.loads(text)
+        recipe = json.loads(text) if ending == ".json" else tomllib.loads(text)
     except Exception as error:  # whatever a parser raises on a hostile file
         raise RecipeError(f"{os.fspath(path)}: not valid {ending[1:].upper()}: {error}") from error
+    if isinstance(recipe, dict) and isinstance(recipe.get("report"), dict):
+        recipe = recipe["report"].get("recipe")
     try:
         return from_recipe(recipe)
     except (RecipeError, RecursionError) as error:
         raise RecipeError(f"{os.fspath(path)}: {error}") from None
-
-
-def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """A table of JSON, in which no key may stand twice."""
-    often = Counter(key for key, _ in pairs)
-    if len(often) < len(pairs):
-        raise ValueError(f"the key {often.most_common(1)[0][0]!r} appears twice in one table")
-    return dict(pairs)
 
 
 def from_recipe(recipe: dict[str, Any]) -> Pipeline:
@@ -201,7 +159,6 @@ def from_recipe(recipe: dict[str, Any]) -> Pipeline:
     20
     """
     _check_head(recipe)
-    _refuse_gaps(recipe)
     if "extends" in recipe:
         return _extended(recipe["extends"], recipe.get("set", {}))
     stages = recipe["pipeline"]
@@ -216,26 +173,19 @@ def _check_head(recipe: Any) -> None:
     example = f'{{"glsk_o3d": {{"version": {RECIPE_VERSION}}}, "pipeline": [...]}}'
     if not isinstance(recipe, dict):
         raise RecipeError(f"a recipe is a table such as {example}, not {shown(recipe)}")
-    head = recipe.get("glsk_o3d")
-    if not isinstance(head, dict) or "version" not in head:
+    version = recipe["glsk_o3d"].get("version") if isinstance(recipe.get("glsk_o3d"), dict) else None
+    if version is None:
         raise RecipeError(f"glsk_o3d.version: is missing; a recipe is a table such as {example}")
-    version = head["version"]
-    if isinstance(version, bool) or not isinstance(version, int) or version < 1:
-        raise RecipeError(f"glsk_o3d.version: must be {RECIPE_VERSION}, not {shown(version)}")
-    if version > RECIPE_VERSION:
-        raise RecipeError(f"glsk_o3d.version: is {version} and this release reads {RECIPE_VERSION}: update glsk-o3d")
-    for path, table, known in (
-        ("glsk_o3d.", head, ("version",)),
-        ("", recipe, ("glsk_o3d", "pipeline", "extends", "set")),
-    ):
-        for key in table:
-            if key not in known:
-                raise RecipeError(f"{path}{brief(key)}: {did_you_mean(str(key), known, 'key of this table')}")
-    if ("pipeline" in recipe) == ("extends" in recipe):
-        both = "has both" if "pipeline" in recipe else "lacks both"
-        raise RecipeError(f"a recipe has either 'pipeline' or 'extends', and this one {both}")
-    if "set" in recipe and "extends" not in recipe:
-        raise RecipeError("set: changes the pipeline that 'extends' names, and there is no 'extends'")
+    if version != RECIPE_VERSION:
+        raise RecipeError(
+            f"glsk_o3d.version: is {shown(version)}; this release reads {RECIPE_VERSION}: update glsk-o3d"
+        )
+    keys = ("glsk_o3d", "extends", "set") if "extends" in recipe else ("glsk_o3d", "pipeline")
+    for key in recipe:
+        if key not in keys:
+            raise RecipeError(f"{key}: {did_you_mean(str(key), keys, 'key of this table')}")
+    if not {"pipeline", "extends"} & set(recipe):
+        raise RecipeError("a recipe has either 'pipeline' or 'extends', and this one lacks both")
 
 
 def _extended(name: Any, changes: Any) -> Pipeline:
@@ -249,7 +199,7 @@ def _extended(name: Any, changes: Any) -> Pipeline:
     for owner, values in changes.items():
         cls = find(owner)
         if cls is None:
-            raise RecipeError(f"set.{brief(owner)}: {did_you_mean(str(owner), catalogue(), 'filter or rule')}")
+            raise RecipeError(f"set.{owner}: {did_you_mean(str(owner), catalogue(), 'filter or rule')}")
         read |= {f"{owner}.{field}": value for field, value in _values(cls, values, f"set.{owner}").items()}
     return _valid(lambda: pipeline.with_options(read), "set")
 
@@ -257,6 +207,7 @@ def _extended(name: Any, changes: Any) -> Pipeline:
 def _part(table: Any, path: str, role: str) -> Parameters:
     """A filter, reducer or rule from its table."""
     kind = "rule" if role == "stop" else "filter"
+    _refuse_gap(table, path)
     if not isinstance(table, dict) or kind not in table:
         raise RecipeError(f'{path}: must be a table such as {{"{kind}": NAME, ...}}, not {shown(table)}')
     name = table[kind]
@@ -272,6 +223,11 @@ def _part(table: Any, path: str, role: str) -> Parameters:
     return _valid(lambda: cls(**values), path)
 
 
+def _refuse_gap(value: Any, path: str) -> None:
+    if isinstance(value, dict) and UNWRITTEN in value:
+        raise RecipeError(f"{path}: a recipe cannot hold it: {value[UNWRITTEN]}")
+
+
 def _values(cls: type[Parameters], table: Any, path: str) -> dict[str, Any]:
     """Parameters of a class, each checked."""
     if not isinstance(table, dict):
@@ -281,7 +237,8 @@ def _values(cls: type[Parameters], table: Any, path: str) -> dict[str, Any]:
     for name, value in table.items():
         if name not in fields:
             hint = did_you_mean(str(name), fields, f"parameter of {cls.__name__}")
-            raise RecipeError(f"{path}.{brief(name)}: {hint}")
+            raise RecipeError(f"{path}.{name}: {hint}")
+        _refuse_gap(value, f"{path}.{name}")
         facts = fields[name]
         kind = facts["type"]
         if kind.endswith("?") and value == NONE and NONE not in facts["choices"]:

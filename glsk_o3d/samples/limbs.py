@@ -17,36 +17,25 @@ LEAN, BEND, UPWARDS = 0.7, 0.3, 0.2  # how far limbs turn aside at a fork, on th
 
 
 def y_junction(
-    n: int = 4096,
-    *,
-    length: float = 0.5,
-    radii: tuple[float, float, float] = (0.09, 0.07, 0.07),
-    angle: float = 80.0,
-    noise: float = 0.0,
-    seed: int = 0,
+    n: int = 4096, *, radii: tuple[float, float, float] = (0.09, 0.07, 0.07), noise: float = 0.0, seed: int = 0
 ) -> Sample:
-    """Three straight tubes that meet in the origin: a stem downwards and two arms.
+    """Three straight tubes of length 0.5 that meet in the origin: a stem downwards and two arms, 80 degrees apart.
 
     Parameters
     ----------
     n, noise, seed : int, float, int
         As in `sample_object`.
-    length : float
-        Length of each axis.
     radii : tuple of three floats
         At the ends of the stem and of the two arms; all have the stem's radius in the middle.
-    angle : float
-        Between the arms, in degrees.
 
     Examples
     --------
     >>> y_junction(500)
     Sample('y_junction', 500 points, 4 nodes, 3 edges)
     """
-    half = np.deg2rad(angle) / 2
-    check(n, noise, length=length, angle=angle, stem=radii[0], left=radii[1], right=radii[2])
-    ends = length * np.array([[0, 0, -1], [-np.sin(half), 0, np.cos(half)], [np.sin(half), 0, np.cos(half)]])
-    nodes = np.concatenate([np.zeros((1, 3)), ends])
+    check(n, noise, stem=radii[0], left=radii[1], right=radii[2])
+    sine, cosine = np.sin(np.deg2rad(40)), np.cos(np.deg2rad(40))
+    nodes = 0.5 * np.array([[0, 0, 0], [0, 0, -1], [-sine, 0, cosine], [sine, 0, cosine]])
     edges = np.array([[0, 1], [0, 2], [0, 3]])
     return union_sample("y_junction", nodes, edges, np.array([radii[0], *radii], float), n, noise, seed)
 

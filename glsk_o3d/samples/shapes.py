@@ -38,46 +38,31 @@ def tube(
     return Sample(noisy(points, noise, rng), *axis, "tube")
 
 
-def helix(
-    n: int = 4096,
-    *,
-    coil_radius: float = 0.3,
-    radius: float = 0.06,
-    pitch: float = 0.35,
-    turns: float = 2.0,
-    noise: float = 0.0,
-    seed: int = 0,
-) -> Sample:
-    """A coil spring around z, its ends closed by half balls.
+def helix(n: int = 4096, *, noise: float = 0.0, seed: int = 0) -> Sample:
+    """A coil spring of two turns around z, its ends closed by half balls.
 
     Parameters
     ----------
     n, noise, seed : int, float, int
         As in `sample_object`.
-    coil_radius, radius : float
-        Of the axis, a helix, and of the wire; the turns must not touch and the wire must not fold.
-    pitch, turns : float
-        Rise per turn, and the number of turns.
 
     Examples
     --------
     >>> helix(500)
     Sample('helix', 500 points, 193 nodes, 192 edges)
     """
-    check(n, noise, coil_radius=coil_radius, radius=radius, pitch=pitch, turns=turns)
+    check(n, noise)
+    coil, radius, pitch, turns = 0.3, 0.06, 0.35, 2.0  # of the axis, of the wire, rise per turn
     climb = pitch / (2 * np.pi)
-    speed = np.hypot(coil_radius, climb)
-    curvature = coil_radius / speed**2
-    if radius * curvature >= 1 or 2 * radius * speed >= pitch * coil_radius:
-        raise InvalidParameterError(f"radius = {radius}: the turns of the helix touch, or its wire folds")
+    speed = np.hypot(coil, climb)
+    curvature, end = coil / speed**2, 2 * np.pi * turns
     rng = np.random.default_rng(seed)
-    end = 2 * np.pi * turns
     wire, cap = speed * end * 2 * np.pi * radius, 2 * np.pi * radius**2
 
     def frame(t):
-        centre = np.stack([coil_radius * np.cos(t), coil_radius * np.sin(t), climb * (t - end / 2)], axis=-1)
+        centre = np.stack([coil * np.cos(t), coil * np.sin(t), climb * (t - end / 2)], axis=-1)
         inward = np.stack([-np.cos(t), -np.sin(t), np.zeros_like(t)], axis=-1)
-        tangent = np.stack([-coil_radius * np.sin(t), coil_radius * np.cos(t), np.full_like(t, climb)], axis=-1) / speed
+        tangent = np.stack([-coil * np.sin(t), coil * np.cos(t), np.full_like(t, climb)], axis=-1) / speed
         return centre, inward, tangent
 
     def draw(m):
@@ -96,7 +81,7 @@ def helix(
         return points[rng.uniform(0, 1 + radius * curvature, m) < density]
 
     points = collect(draw, n)
-    axis = chain(frame(np.linspace(0, end, max(2, int(96 * turns) + 1)))[0], radius)
+    axis = chain(frame(np.linspace(0, end, 193))[0], radius)
     return Sample(noisy(points, noise, rng), *axis, "helix")
 
 
@@ -123,33 +108,25 @@ def torus(n: int = 4096, *, ring_radius: float = 0.4, radius: float = 0.1, noise
     return Sample(noisy(points, noise, rng), nodes, edges, radii, "torus")
 
 
-def two_rings(
-    n: int = 4096, *, ring_radius: float = 0.3, radius: float = 0.06, noise: float = 0.0, seed: int = 0
-) -> Sample:
+def two_rings(n: int = 4096, *, noise: float = 0.0, seed: int = 0) -> Sample:
     """Two links of a chain, which do not touch: two components, two loops.
 
     Parameters
     ----------
     n, noise, seed : int, float, int
         As in `sample_object`.
-    ring_radius : float
-        Radius of each axis; the second circle goes through the middle of the first.
-    radius : float
-        Radius of the tubes, below half of `ring_radius`.
 
     Examples
     --------
     >>> two_rings(500)
     Sample('two_rings', 500 points, 256 nodes, 256 edges)
     """
-    check(n, noise, ring_radius=ring_radius, radius=radius)
-    if 2 * radius >= ring_radius:
-        raise InvalidParameterError(f"radius = {radius}: must be below half of ring_radius = {ring_radius}")
+    check(n, noise)
     rng = np.random.default_rng(seed)
-    points, (nodes, edges, radii) = _ring(n, ring_radius, radius, rng)
+    points, (nodes, edges, radii) = _ring(n, 0.3, 0.06, rng)
 
-    def second(x):  # turned about x, and moved by one ring radius
-        return np.stack([x[:, 0] + ring_radius, -x[:, 2], x[:, 1]], axis=1)
+    def second(x):  # turned about x, and moved so that it goes through the middle of the first
+        return np.stack([x[:, 0] + 0.3, -x[:, 2], x[:, 1]], axis=1)
 
     points = np.where(rng.random(n)[:, None] < 0.5, points, second(points))
     nodes, edges = np.concatenate([nodes, second(nodes)]), np.concatenate([edges, edges + len(nodes)])
@@ -170,36 +147,32 @@ def _ring(n, ring_radius, radius, rng):
     return collect(draw, n), chain(circle, radius, closed=True)
 
 
-def sphere(n: int = 4096, *, radius: float = 0.5, noise: float = 0.0, seed: int = 0) -> Sample:
-    """A sphere about the origin. Its axis is one node; its curve skeleton is meaningless.
+def sphere(n: int = 4096, *, noise: float = 0.0, seed: int = 0) -> Sample:
+    """A sphere of radius 0.5 about the origin. Its axis is one node; its curve skeleton is meaningless.
 
     Parameters
     ----------
     n, noise, seed : int, float, int
         As in `sample_object`.
-    radius : float
 
     Examples
     --------
     >>> sphere(500)
     Sample('sphere', 500 points, 1 nodes, 0 edges)
     """
-    check(n, noise, radius=radius)
+    check(n, noise)
     rng = np.random.default_rng(seed)
-    points = radius * directions(n, rng)
-    return Sample(noisy(points, noise, rng), *chain(np.zeros((1, 3)), radius), "sphere")
+    points = 0.5 * directions(n, rng)
+    return Sample(noisy(points, noise, rng), *chain(np.zeros((1, 3)), 0.5), "sphere")
 
 
-def sheet(
-    n: int = 4096, *, length: float = 1.0, width: float = 0.7, bend: float = 60.0, noise: float = 0.0, seed: int = 0
-) -> Sample:
-    """A sheet of paper, rolled along x. It has no axis; its curve skeleton is meaningless.
+def sheet(n: int = 4096, *, bend: float = 60.0, noise: float = 0.0, seed: int = 0) -> Sample:
+    """A sheet of paper of 1.0 x 0.7, rolled along x. It has no axis; its curve skeleton is meaningless.
 
     Parameters
     ----------
     n, noise, seed : int, float, int
         As in `sample_object`.
-    length, width : float
     bend : float
         Angle between the two ends in degrees, below 360; 0 leaves the sheet flat.
 
@@ -208,14 +181,14 @@ def sheet(
     >>> sheet(500)
     Sample('sheet', 500 points, 0 nodes, 0 edges)
     """
-    check(n, noise, length=length, width=width)
+    check(n, noise)
     if not 0 <= bend < 360:
         raise InvalidParameterError(f"bend = {bend}: must be at least 0 and below 360 degrees")
     rng = np.random.default_rng(seed)
-    along, across = rng.uniform(-length / 2, length / 2, n), rng.uniform(-width / 2, width / 2, n)
+    along, across = rng.uniform(-0.5, 0.5, n), rng.uniform(-0.35, 0.35, n)
     points = np.stack([along, across, np.zeros(n)], axis=1)
     if bend:
-        curvature = np.deg2rad(bend) / length
+        curvature = np.deg2rad(bend)
         turn = curvature * along
         points = np.stack([np.sin(turn) / curvature, across, (np.cos(turn) - 1) / curvature], axis=1)
-    return Sample(noisy(points, noise, rng), np.zeros((0, 3)), np.zeros((0, 2), np.int64), np.zeros(0), "sheet")
+    return Sample(noisy(points, noise, rng), *chain(np.zeros((0, 3)), 0), "sheet")

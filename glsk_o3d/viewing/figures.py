@@ -26,13 +26,13 @@ _ARRANGEMENTS = (  # rows of views, each by the coordinates that go across and u
 )
 
 
-def new_figure(size: tuple[float, float]) -> Any:
-    """A white figure of so many pixels, on a canvas of its own: pyplot and its global state stay out of it."""
+def new_figure(size: Any) -> Any:
+    """A white figure of so many inches, on a canvas of its own: pyplot and its global state stay out of it."""
     require("matplotlib")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(np.asarray(size) / DPI, facecolor=PAPER)
+    figure = Figure(size, facecolor=PAPER)
     FigureCanvasAgg(figure)
     return figure
 
@@ -46,14 +46,6 @@ def save_figure(figure, path: str | os.PathLike) -> None:
 def printable(text: object) -> str:
     """A text that may be a file name, which may be no Unicode, as one that can be drawn and encoded."""
     return str(text).encode("utf-8", "replace").decode()
-
-
-def colour_bar(figure, scale, box, ticks: list[float], labels: list[str] | None = None) -> None:
-    """A small horizontal colour bar; the box is left, bottom, width and height, as shares of the figure."""
-    bar = figure.colorbar(scale, cax=figure.add_axes(box), orientation="horizontal")
-    bar.set_ticks(ticks, labels=labels)
-    bar.outline.set_visible(False)
-    bar.ax.tick_params(length=0, pad=2, labelsize=7, labelcolor=INK)
 
 
 def thinned(points: np.ndarray, most: int) -> np.ndarray:

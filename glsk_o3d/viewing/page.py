@@ -122,7 +122,7 @@ def _page(skeleton, recorder, title) -> str:
         sections.topology(report),
         sections.support(report),
         sections.branches(skeleton),
-        sections.origin(skeleton),
+        sections.origin(report),
     )
     parts = {
         "title": escape(title),

@@ -14,6 +14,7 @@ from .preview import ROOT_MARK
 
 _FAR_GREY, _NEAR_GREY = 0.93, 0.55  # of the farthest and of the nearest point
 _TITLE_ROOM = 0.3  # inches
+_MOST_POINTS = 10_000
 _EYE_MARGIN = 0.09  # from the middle of what matplotlib's orthographic eye sees to its edge
 
 
@@ -25,15 +26,14 @@ def plot_skeleton(
     color: Any = (0.85, 0.1, 0.1),
     point_colors: np.ndarray | None = None,
     view: tuple[float, float] = (15.0, -65.0),
-    most_points: int = 10_000,
-    point_size: float = 1.5,
     line_width: float = 2.0,
 ) -> Any:
     """Draw a skeleton and its cloud into matplotlib's three-dimensional axes.
 
-    All axes have one scale and no ticks, and the projection is orthographic. Farther points are lighter, and the
-    skeleton is on top. A blue diamond is the root of a tree, which ``axes.legend()`` names. You can draw more into the
-    returned axes; use ``clip_on=False``, because matplotlib clips to a square.
+    All axes have one scale and no ticks, and the projection is orthographic. Of larger clouds 10 000 points are drawn.
+    Farther points are lighter, and the skeleton is on top. A blue diamond is the root of a tree, which
+    ``axes.legend()`` names. You can draw more into the returned axes; use ``clip_on=False``, because matplotlib clips
+    to a square.
 
     Parameters
     ----------
@@ -49,10 +49,6 @@ def plot_skeleton(
         Red, green and blue of the cloud's points from 0 to 1, instead of greys.
     view : (float, float)
         Elevation and azimuth of the eye [degrees].
-    most_points : int
-        At most so many points are drawn, evenly picked in their order.
-    point_size : float
-        Area of a dot [square points].
     line_width : float
         [points]
 
@@ -91,12 +87,12 @@ def plot_skeleton(
     low, high = (shown.min(axis=0), shown.max(axis=0)) if len(shown) else (np.zeros(3), np.ones(3))
     elevation, azimuth = np.deg2rad(view)
     eye = [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
-    drawn = finite[:: max(1, -(-len(finite) // most_points))]
+    drawn = finite[:: max(1, -(-len(finite) // _MOST_POINTS))]
     drawn = drawn[np.argsort((points[drawn] - low) @ eye, kind="stable")]
     grey = np.linspace(_FAR_GREY, _NEAR_GREY, len(drawn))[:, None].repeat(3, axis=1)
     paint = grey if point_colors is None else np.asarray(point_colors)[drawn]
     axes.computed_zorder = False
-    axes.scatter(*points[drawn].T, s=point_size, c=paint, linewidths=0, depthshade=False, clip_on=False, zorder=1)
+    axes.scatter(*points[drawn].T, s=1.5, c=paint, linewidths=0, depthshade=False, clip_on=False, zorder=1)
     if len(skeleton.edges):
         colors = shades(skeleton, color, branch_of_edge(skeleton), skeleton.edges)
         style = dict(colors=colors, linewidths=line_width, capstyle="round", clip_on=False, zorder=2)

@@ -1,11 +1,11 @@
-"""`assess` on closed forms, and what it and `compare` refuse."""
+"""`assess` on closed forms, and what it refuses."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from glsk_o3d.analysis import assess, compare
+from glsk_o3d.analysis import assess
 from glsk_o3d.analysis.assessment import cross_sections
 from glsk_o3d.errors import InvalidCloudError, InvalidParameterError
 from glsk_o3d.samples import helix, sample_object, torus, tube, two_rings, y_junction
@@ -22,7 +22,7 @@ def test_a_tube_or_half_of_it_and_a_line_beside_its_axis(pipe, d, least, centred
     found = assess(axis_of(pipe, shift=[0, 0, d]), pipe.points[pipe.points[:, 2] > least])
     assert found.centredness == pytest.approx(centredness, abs=1e-12)
     assert found.boundedness == boundedness
-    assert found.smoothness == found.topology == 1
+    assert found.topology == 1
     np.testing.assert_allclose(found.edge_centredness, [centredness], atol=1e-12)
 
 
@@ -47,10 +47,7 @@ def test_between_two_tubes_is_outside(pipe, axis_of):
 def test_a_torus_and_circles_beside_its_axis(ring, ring_radius, centredness, axis_of):
     found = assess(axis_of(ring, scale=ring_radius / 0.4), ring.points)
     assert found.centredness == pytest.approx(centredness, abs=2e-3)  # a section is a little longer than thin
-    assert found.smoothness == pytest.approx(1 - 0.1 / (np.pi * ring_radius), abs=1e-3)
-    (loop,) = found.loops
-    assert (loop.opening, loop.tube_radius) == (pytest.approx(ring_radius, rel=0.01), pytest.approx(0.1, rel=0.01))
-    assert (loop.wider, found.topology) == (True, 1)
+    assert (found.loops, found.wide_loops, found.topology) == (1, 1, 1)
 
 
 @pytest.mark.parametrize("make", [tube, torus, helix, y_junction, two_rings, sample_object])
@@ -59,10 +56,9 @@ def test_the_axis_of_every_sample_is_good(make, axis_of):
     found = assess(axis_of(sample), sample.points)
     assert found.centredness > (0.85 if make is sample_object else 0.97)  # two cameras did not see all of it
     assert found.boundedness > 0.94
-    assert found.smoothness > 0.9
     assert found.topology == 1
     assert found.components == found.clusters == (2 if make is two_rings else 1)
-    assert len(found.loops) == found.wide_loops == {torus: 1, two_rings: 2, sample_object: 1}.get(make, 0)
+    assert found.loops == found.wide_loops == {torus: 1, two_rings: 2, sample_object: 1}.get(make, 0)
 
 
 def test_a_bridge_through_the_air_is_outside(pipe, curve):
@@ -74,27 +70,13 @@ def test_a_bridge_through_the_air_is_outside(pipe, curve):
     assert (found.components, found.clusters, found.topology) == (1, 2, 0.5)
 
 
-def test_smoothness_of_a_zigzag_and_of_repeated_points(pipe, curve):
-    """Turning by 90 degrees every 0.02 in a tube of radius 0.1."""
-    x = np.arange(-20, 21) * 0.02 / np.sqrt(2)
-    zigzag = curve(np.column_stack([x, 0.02 / np.sqrt(2) * (np.arange(41) % 2), 0 * x]))
-    assert assess(zigzag, pipe.points).smoothness == 0
-    coarse = curve([[-0.5, 0, 0], [0, 0, 0], [0, 0.05, 0], [0.5, 0.05, 0]])
-    expected = 1 - 2 * (np.pi / 2) * 0.1 / (np.pi * coarse.length)
-    assert assess(coarse, pipe.points).smoothness == pytest.approx(expected, rel=0.02)
-    path = np.linspace([-0.5, 0, 0], [0.5, 0, 0], 9)
-    assert assess(curve(np.repeat(path, 2, axis=0)), pipe.points).smoothness == 1
-
-
 def test_false_loops_open_less_than_their_tube(pipe, curve):
     square = curve(
         [[-0.5, 0, 0], [0, -0.03, 0], [0, 0.03, 0], [0.06, 0.03, 0], [0.06, -0.03, 0], [0.5, 0, 0]],
         [[0, 1], [1, 2], [2, 3], [3, 4], [1, 4], [4, 5]],
     )
     found = assess(square, pipe.points)
-    (loop,) = found.loops
-    assert loop.opening == pytest.approx(0.03, rel=0.02)
-    assert (loop.wider, found.wide_loops, found.topology) == (False, 0, 0)
+    assert (found.loops, found.wide_loops, found.topology) == (1, 0, 0)
     assert np.isnan(found.edge_centredness).any()  # at its junctions
 
 
@@ -104,7 +86,7 @@ def test_assessments_have_no_unit(axis_of):
     expected = assess(axis, sample.points)
     found = assess(replace(axis, vertices=axis.vertices * scale + scale), sample.points * scale + scale)
     assert found.clusters == expected.clusters == 1
-    for name in ("centredness", "boundedness", "smoothness", "topology"):
+    for name in ("centredness", "boundedness", "topology"):
         assert getattr(found, name) == pytest.approx(getattr(expected, name), rel=1e-6)
 
 
@@ -112,18 +94,6 @@ def test_outliers_and_points_that_are_not_finite(pipe, axis_of):
     found = assess(axis_of(pipe), np.concatenate([pipe.points, [[0, 3, 0], [np.nan, 0, 0], [0, 0, -np.inf]]]))
     assert found.centredness == pytest.approx(1, abs=1e-12)
     assert found.boundedness == found.topology == 1
-
-
-def test_edges_may_be_given_in_any_way_and_nothing_is_modified(ring, curve):
-    shuffled = np.random.default_rng(0).permutation(ring.edges)[:, ::-1]
-    one, other = (curve(ring.nodes, edges) for edges in (ring.edges, shuffled))
-    points = ring.points.copy()
-    for array in (points, other.vertices, other.edges):
-        array.flags.writeable = False
-    compare(other, ring)
-    found = assess(other, points)
-    assert found.as_dict() == assess(one, ring.points).as_dict()
-    assert found.edge_centredness.shape == (len(shuffled),)
 
 
 @pytest.mark.parametrize(("away", "centredness"), [(0, 1), (1, 0)])
@@ -138,33 +108,13 @@ def test_clouds_with_too_few_points(cloud, curve):
         assess(curve(LINE), cloud)
 
 
-@pytest.mark.parametrize("scale", [1e200, 1e-200])
-def test_clouds_whose_squares_overflow_are_refused(pipe, axis_of, scale):
-    with pytest.raises(InvalidCloudError, match="its square is out of range"):
-        assess(axis_of(pipe), pipe.points * scale)
+def test_clouds_whose_squares_overflow_are_refused(pipe, curve):
+    for cloud in (pipe.points * 1e200, pipe.points * 1e-200, [[1e200, 0, 0]]):
+        with pytest.raises(InvalidCloudError, match="its square is out of range"):
+            assess(curve(LINE), np.array(cloud))
 
 
-def test_a_point_too_far_off_to_have_a_place_is_refused(curve):
-    with pytest.raises(InvalidCloudError, match="its square is out of range"):
-        assess(curve(LINE), np.array([[1e200, 0, 0]]))
-
-
-@pytest.mark.parametrize(
-    ("vertices", "edges", "message"),
-    [
-        (np.empty((0, 3)), np.empty((0, 2), int), "the skeleton (is empty|has no edge with a length)"),
-        ([[0, 0, 0], [np.nan, 0, 0]], [[0, 1]], r"vertices\[1\].*must be finite"),
-        (LINE, [[0, 2]], "names a missing vertex"),
-        (LINE, [[-1, 1]], "names a missing vertex"),
-    ],
-)
-def test_skeletons_that_are_none(pipe, vertices, edges, message, curve):
-    for measure in (lambda s: compare(s, pipe), lambda s: assess(s, pipe.points)):
-        with pytest.raises(InvalidParameterError, match=message):
-            measure(curve(vertices, edges))
-
-
-@pytest.mark.parametrize("vertices", [[[0, 0, 0]], [[1, 1, 1], [1, 1, 1]]])
+@pytest.mark.parametrize("vertices", [np.empty((0, 3)), [[0, 0, 0]], [[1, 1, 1], [1, 1, 1]]])
 def test_no_curve_to_assess(pipe, vertices, curve):
     with pytest.raises(InvalidParameterError, match="no edge with a length"):
         assess(curve(vertices), pipe.points)

@@ -1,6 +1,5 @@
 """Grasp candidates on axes whose openings, counts and directions are known."""
 
-import csv
 import json
 from dataclasses import replace
 
@@ -8,7 +7,6 @@ import numpy as np
 import pytest
 
 from glsk_o3d import InvalidParameterError, Skeleton, SkeletonWarning, samples
-from glsk_o3d.analysis import Gripper
 from glsk_o3d.analysis import grasp_candidates as checked_candidates
 
 WIDE = 10.0
@@ -100,22 +98,15 @@ def test_places_share_the_room_between_the_margins(spacing, count):
     np.testing.assert_allclose(x.min(), -x.max(), atol=1e-12)
 
 
-@pytest.mark.parametrize("up", [(1, 0, 0), (-2, 0, 0), (1, 1e-9, 0)])
-def test_an_axis_that_points_up(up):
-    grasps = grasp_candidates(TUBE, 0.5, up=up, around=2)
-    directions_are_sound(grasps)
-    np.testing.assert_allclose(grasps.approach[: grasps.places], np.tile(grasps.approach[0], (grasps.places, 1)))
-
-
 # ------------------------------------------------------------------------------------------------------ what is taken
 
 
 def test_places_keep_away_from_ends_and_junctions():
     sample = samples.y_junction(10, radii=(0.09, 0.05, 0.05))
-    grasps = grasp_candidates(axis_of(sample), WIDE, margin=1.5, spacing=0.01)
+    grasps = grasp_candidates(axis_of(sample), WIDE, spacing=0.01)
     distance = np.linalg.norm(grasps.position[:, None] - sample.nodes, axis=2)
-    assert (distance >= 1.5 * sample.radii - 1e-12).all()
-    np.testing.assert_allclose(distance.min(axis=0), 1.5 * sample.radii, atol=0.01)
+    assert (distance >= sample.radii - 1e-12).all()
+    np.testing.assert_allclose(distance.min(axis=0), sample.radii, atol=0.01)
     assert set(grasps.branch) == {0, 1, 2}
 
 
@@ -132,12 +123,11 @@ def test_a_loop_with_a_junction_has_margins_too(loop):
 
 def test_every_place_is_taken_or_told():
     doubtful = replace(SAUROPOD, confidence=np.where(SAUROPOD.vertices[:, 0] > 0.3, 0.2, 0.9))
-    grasps = grasp_candidates(doubtful, Gripper(0.16, 0.065), clearance=0.01, around=3)
-    assert set(grasps.left_out) >= {"too wide", "too thin", "uncertain"}
+    grasps = grasp_candidates(doubtful, 0.16, clearance=0.01, around=3)
+    assert set(grasps.left_out) >= {"too wide", "uncertain"}
     places = sum(count for reason, count in grasps.left_out.items() if not reason.startswith("branches"))
     assert len(grasps) == 3 * (grasps.places - places)
     assert grasps.opening.max() <= 0.16
-    assert grasps.opening.min() > 0.065 + 0.01
     assert grasps.confidence.min() >= 0.5
     assert (grasps.quality > 0).all()
     assert (grasps.quality < 0.9).all()
@@ -147,11 +137,9 @@ def test_every_place_is_taken_or_told():
 @pytest.mark.parametrize(
     ("skeleton", "options", "why"),
     [
-        (cone(0.1, 1.2), dict(gripper=WIDE, spacing=0.25, margin=0), "5 too wide"),  # it is one ball
         (TUBE, dict(gripper=0.2), "no grasp at 9 places: 9 too wide"),
-        (TUBE, dict(gripper=Gripper(0.3, 0.21)), "9 too thin"),
         (axis_of(samples.tube(10), 0.3), dict(gripper=1.0), "9 uncertain"),
-        (TUBE, dict(gripper=1.0, margin=6), "no grasp at 0 places: 1 branches without a place"),
+        (replace(TUBE, radii=[0.6, 0.6]), dict(gripper=2.0), "no grasp at 0 places: 1 branches without a place"),
         (replace(TUBE, edges=()), dict(gripper=1.0), "the skeleton has no branch"),
     ],
 )
@@ -162,7 +150,6 @@ def test_nothing_to_grasp_is_told(skeleton, options, why, tmp_path):
     assert len(grasps) == len(list(grasps)) == 0
     assert grasps.position.shape == grasps.approach.shape == grasps.closing.shape == grasps.axis.shape == (0, 3)
     assert grasps.poses.shape == (0, 4, 4)
-    assert len(grasps.to_line_set().lines) == 0
     grasps.to_csv(tmp_path / "g.csv")
     assert (tmp_path / "g.csv").read_text().startswith("grasp,position_x,")
     grasps.to_json(tmp_path / "g.json")
@@ -195,11 +182,10 @@ def test_unknown_confidence_and_radii():
         (dict(gripper=0), "max_opening = 0: .* above 0"),
         (dict(gripper=1.0, clearance=-0.1), "clearance"),
         (dict(gripper=1.0, spacing=0.0), "spacing"),
-        (dict(gripper=1.0, margin=np.nan), "margin"),
         (dict(gripper=1.0, min_confidence=1.1), "min_confidence"),
         (dict(gripper=1.0, around=0), "around = 0"),
-        (dict(gripper=1.0, up="z"), "up = 'z'"),
-        (dict(gripper=1.0, cone=(0, 0, 1)), r"cone = \(0, 0, 1\): must be a direction and an angle"),
+        (dict(gripper=1.0, cone=(0, 0, 1)), r"cone = \(0, 0, 1\): must be three numbers and an angle"),
+        (dict(gripper=1.0, cone=((0, 0, 0), 9)), r"direction of cone = \(0, 0, 0\): must be finite, and not all 0"),
         (dict(gripper=1.0, cone=((0, 0, 1), 200)), "angle of cone = 200: .* at most 180"),
     ],
 )
@@ -233,22 +219,17 @@ def test_lines_of_the_gripper():
     np.testing.assert_allclose(tips.mean(axis=1), tip, atol=1e-12)
     np.testing.assert_allclose(tips[:, 0] - tips[:, 1], grasps.opening[:, None] * grasps.closing, atol=1e-12)
     np.testing.assert_allclose(points[:, 4], tip - grasps.gripper.finger[2] * grasps.approach, atol=1e-12)
-    assert np.asarray(lines.lines).shape == np.asarray(lines.colors).shape[:1] + (2,) == (4 * len(grasps), 2)
-    colour = np.asarray(lines.colors)[::4]
-    assert (colour[0] > colour[-1]).tolist() == [True, True, False]  # yellow is best, dark blue worst
+    assert np.asarray(lines.lines).shape == (4 * len(grasps), 2)
     ends = np.asarray(lines.points)[np.asarray(lines.lines)]
     assert np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).min() > 0.4 * grasps.opening.min()
 
 
 def test_files(tmp_path):
     grasps = grasp_candidates(replace(SAUROPOD, confidence=()), 0.2, min_confidence=0)
-    grasps.to_csv(tmp_path / "g.csv")
-    with (tmp_path / "g.csv").open(newline="") as stream:
-        rows = list(csv.DictReader(stream))
-    assert len(rows) == len(grasps)
-    assert {row["confidence"] for row in rows} == {""}
+    rows = list(grasps)
+    assert np.isnan([row["confidence"] for row in rows]).all()
     for name in ("position", "approach", "closing"):
-        values = np.array([[float(row[f"{name}_{axis}"]) for axis in "xyz"] for row in rows])
+        values = [[row[f"{name}_{axis}"] for axis in "xyz"] for row in rows]
         np.testing.assert_array_equal(values, getattr(grasps, name))
     grasps.to_json(tmp_path / "g.json")
     data = json.loads((tmp_path / "g.json").read_text())
@@ -256,6 +237,3 @@ def test_files(tmp_path):
     np.testing.assert_array_equal([row["pose"] for row in data["grasps"]], grasps.poses)
     np.testing.assert_array_equal([row["opening"] for row in data["grasps"]], grasps.opening)
     assert {row["confidence"] for row in data["grasps"]} == {None}
-    with pytest.raises(InvalidParameterError, match="no grasp to draw"):
-        grasps[:0].to_ply(tmp_path / "g.ply")
-    assert not (tmp_path / "g.ply").exists()

@@ -116,8 +116,9 @@ def rows(tmp_path):
     def read(out="out", strict=True) -> dict[str, dict]:
         out = tmp_path / out
         lines = [json.loads(line) for line in (out / "ledger.jsonl").read_bytes().splitlines()]
-        for key in ("name", "input"):
-            assert max(Counter(line[key] for line in lines).values(), default=1) == 1, f"a {key} is there twice"
+        if strict:
+            assert max(Counter(line["name"] for line in lines).values(), default=1) == 1, "a name is there twice"
+        lines = [line for line in lines if strict or line["status"] != "started"]
         for line in lines:
             assert (line["status"], line["error"] == "") in (("done", True), ("failed", False))
             for output in line["outputs"]:
@@ -127,7 +128,7 @@ def rows(tmp_path):
         written = {output for line in lines for output in line["outputs"]}
         own = {"ledger.jsonl", "ledger.csv", "recipe.json", ".ledger.lock"}
         there = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()} - own
-        there -= {name for name in there if name.startswith(".parts/") and (name.endswith(".json") or not strict)}
+        there -= {name for name in there if name.startswith(".parts/")}
         assert written == there if strict else written <= there
         return {line["name"]: line for line in lines}
 

@@ -6,7 +6,6 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -22,13 +21,13 @@ def lines(folder):
     return [json.loads(line) for line in (folder / "ledger.jsonl").read_bytes().splitlines()]
 
 
-def test_rows_are_in_the_file_at_once_and_the_last_of_a_name_and_of_an_input_counts(tmp_path):
+def test_rows_are_in_the_file_at_once_and_the_last_of_a_name_counts(tmp_path):
     ledger = Ledger(tmp_path)
-    for each in (row("b", status="failed"), row("a"), row("b"), row("sub/a", input="/in/a.ply")):
+    for each in (row("b", status="failed"), row("a"), row("b")):
         ledger.add(each)
         assert lines(tmp_path)[-1] == each
     ledger.close()
-    assert lines(tmp_path) == [row("b"), row("sub/a", input="/in/a.ply")]
+    assert lines(tmp_path) == [row("a"), row("b")]
     assert Ledger(tmp_path).rows == ledger.rows
 
 
@@ -41,7 +40,7 @@ def test_a_broken_end_is_mended(tmp_path, end, caplog):
     ledger.path.write_bytes(ledger.path.read_bytes() + end)
     again = Ledger(tmp_path)
     assert list(again.rows) == ["a"]
-    assert "1 broken lines passed over" in caplog.text
+    assert "line 2: broken, passed over" in caplog.text
     again.rewrite()
     again.add(row("c"))
     assert lines(tmp_path) == [row("a"), row("c")]
@@ -52,15 +51,10 @@ def test_a_broken_end_is_mended(tmp_path, end, caplog):
     [
         dict(outputs=["../keep.me"]),
         dict(outputs=["a.ply", "/etc/keep.me"]),
-        dict(outputs=["sub/../../keep.me"]),
-        dict(outputs=[f"a{os.sep}..{os.sep}..{os.sep}keep.me"]),
-        dict(outputs=["a\0.ply"]),
         dict(outputs=[7]),
         dict(outputs="a.ply"),
         dict(name="../a"),
-        dict(name="/tmp/a"),
         dict(name=""),
-        dict(name=7),
         dict(input=None),
         dict(status="perhaps"),
     ],
@@ -74,15 +68,13 @@ def test_a_line_that_no_batch_wrote_is_passed_over(tmp_path, harm):
 def test_the_table(tmp_path):
     ledger = Ledger(tmp_path)
     ledger.add(row('a, \n"b"', messages=["x", "y"], outputs=["a.ply", "a.png"], loops=2, unknown=1))
-    ledger.add(row("=cmd|' /C calc'!A0", messages=["+1"], points=-3))
     ledger.add(row(os.fsdecode(b"\xff"), status="failed", error="no"))
     ledger.close()
     with (tmp_path / "ledger.csv").open(encoding="utf-8", newline="") as stream:
-        formula, table, odd = csv.DictReader(stream)
+        table, odd = csv.DictReader(stream)
     assert tuple(table) == LEDGER_COLUMNS
     assert (table["name"], table["messages"], table["outputs"]) == ('a, \n"b"', "x; y", "a.ply; a.png")
     assert (odd["status"], odd["error"], odd["loops"]) == ("failed", "no", "")
-    assert (formula["name"], formula["messages"], formula["points"]) == ("'=cmd|' /C calc'!A0", "'+1", "-3")
     assert list(Ledger(tmp_path).rows)[-1] == os.fsdecode(b"\xff")
 
 
@@ -101,20 +93,9 @@ def test_the_lock_dies_with_its_owner(tmp_path):
     pipe = subprocess.PIPE
     owner = subprocess.Popen([sys.executable, "-c", code, tmp_path], stdin=pipe, stdout=pipe, text=True)
     assert owner.stdout.readline() == "mine\n"
-    with pytest.raises(BatchError, match=f"process {owner.pid} on"), locked(tmp_path):
+    with pytest.raises(BatchError, match="another batch writes there"), locked(tmp_path):
         pytest.fail("two hold it")
     owner.kill()
     owner.communicate()
     with locked(tmp_path):
         pass
-
-
-def test_an_error_names_the_ledger(tmp_path, monkeypatch):
-    ledger = Ledger(tmp_path)
-
-    def full(self, *arguments, **options):
-        raise OSError(27, "File too large")
-
-    monkeypatch.setattr(Path, "open", full)
-    with pytest.raises(OSError, match=r"cannot be written: File too large: '.*ledger\.jsonl'"):
-        ledger.add({"name": "a"})

@@ -3,17 +3,15 @@
 import json
 import os
 import re
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import glsk_o3d
-from glsk_o3d import BatchError, Connector, InvalidParameterError, RecipeError, pipelines, read_skeleton, skeletonize
+from glsk_o3d import Connector, InvalidParameterError, RecipeError, pipelines, read_skeleton, skeletonize
 from glsk_o3d.batch import plan_batch, run_batch
-from glsk_o3d.batch.ledger import LEDGER_COLUMNS, file_hash, locked
+from glsk_o3d.batch.ledger import LEDGER_COLUMNS, file_hash
 from glsk_o3d.recipes import to_recipe
 from glsk_o3d.samples import torus
 
@@ -87,32 +85,16 @@ def test_an_error_in_on_result_leaves_no_stale_result(run, scans, rows, tmp_path
     with pytest.raises(LookupError):
         run(pipeline="wen2024", on_result=stop)
     left = {row["name"]: row["status"] for row in map(json.loads, (out / "ledger.jsonl").read_text().splitlines())}
-    stale = [name for name, status in left.items() if status == "stale"]
+    started = [name for name, status in left.items() if status == "started"]
     assert len(left) == 3
-    assert stale
-    (scans / f"{stale[0]}.ply").write_text("no")
-    for pipeline in ("default", "wen2024"):  # what is there is of the first, and no one's any more
+    assert started
+    for pipeline in ("default", "wen2024"):  # what was there was of the first, and is no one's any more
         why = {task.name: task.why for task in plan_batch(scans, out, pipeline=pipeline).tasks}
-        assert {why[name] for name in stale} == {"interrupted before"}
+        assert {why[name] for name in started} == {"interrupted before"}
+    (scans / f"{started[0]}.ply").write_text("no")
     run(pipeline="wen2024")
     assert len({row["parameters"] for row in rows().values()}) == 1
-    assert list(out.glob(f"{stale[0]}.*")) == list(out.glob("?.json")) == []  # what is no longer true is taken away
-
-
-def test_what_a_broken_line_left_is_replaced_and_never_removed(run, scans, rows, write, tmp_path, caplog):
-    run()
-    out = tmp_path / "out"
-    old = (out / "a.ply").read_bytes()
-    (out / "ledger.jsonl").write_text('{"name": "a", "inp')
-    (scans / "a.ply").write_text("no")
-    write(scans / "b.ply", seed=9)
-    assert run() == dict.fromkeys("abc", "new")
-    assert "1 broken lines passed over" in caplog.text
-    assert [row["outputs"] for row in rows(strict=False).values()] == [[], ["b.ply"], ["c.ply"]]
-    assert (out / "a.ply").read_bytes() == old  # nobody knows whose it is
-    write(scans / "a.ply", seed=8)
-    assert run() == {"a": "failed before"}
-    assert rows()["a"]["outputs"] == ["a.ply"]
+    assert list(out.glob(f"{started[0]}.*")) == list(out.glob("?.json")) == []  # what is no longer true is taken away
 
 
 @pytest.mark.parametrize("name", ["a.ply", "a.png", "recipe.json", "ledger.csv"])
@@ -143,49 +125,26 @@ def test_a_scan_that_is_not_there_costs_no_results(run, scans, rows, tmp_path):
     assert rows()["a"]["status"] == "done"
 
 
-def test_what_cannot_be_removed_hides_nothing(run, scans, rows, tmp_path):
-    inputs = [scans / "a.ply", scans / "b.ply"]
-    run(inputs, formats=["ply", "json"])
-    inputs[0].write_text("no")
-    for name in ("a.json", "b.json"):  # in their places folders, which no unlink removes
-        (tmp_path / "out" / name).unlink()
-        (tmp_path / "out" / name / "x").mkdir(parents=True)
-    run(inputs, force=True)
-    assert [row["status"] for row in rows().values()] == ["failed", "done"]
-    for name, row in rows().items():
-        assert any(f"{name}.json" in message and "could not be removed" in message for message in row["messages"])
-
-
-def test_names_that_change_leave_no_orphans(run, scans, rows, write, tmp_path):
-    run(formats=["ply", "json"])
+def test_names_that_change(run, scans, rows, write, tmp_path):
+    run()
     write(scans / "a.xyz", seed=7)  # now both need their endings
     assert run() == {"a.ply": "new", "a.xyz": "new"}
-    assert list(rows()) == ["a.ply", "a.xyz", "b", "c"]
+    assert list(rows()) == ["a", "a.ply", "a.xyz", "b", "c"]
     write(tmp_path / "more" / "d.ply", seed=7)
     assert run([scans, tmp_path / "more" / "d.ply"]) == {"d": "new"}  # another input renames none
     scans.rename(tmp_path / "moved")
     assert run([tmp_path / "moved"]) == {}  # the same bytes somewhere else
-    assert {Path(row["input"]).parent.name for row in rows().values()} == {"moved", "more"}
+    assert rows()["b"]["input"] == str(tmp_path / "moved" / "b.ply")
 
 
 def test_results_of_other_scans_are_not_replaced(run, scans, rows, write, tmp_path):
     run()
     write(tmp_path / "tuesday" / "a.ply", seed=7)
-    with pytest.raises(InvalidParameterError, match=r"results, a, .*give another folder"):
+    with pytest.raises(InvalidParameterError, match=r"both be called a: give the folder above"):
         run([tmp_path / "tuesday"])
     (scans / "a.ply").unlink()
     assert run([tmp_path / "tuesday"]) == {"a": "input changed"}
     assert rows()["a"]["input"] == str(tmp_path / "tuesday" / "a.ply")
-
-
-def test_a_ledger_from_elsewhere_removes_nothing(run, scans, tmp_path):
-    run()
-    ledger, treasure = tmp_path / "out" / "ledger.jsonl", tmp_path / "treasure.ply"
-    treasure.write_text("kept")
-    ledger.write_text(ledger.read_text().replace('["a.ply"]', '["a.ply", "a./../../treasure.ply", "../treasure.ply"]'))
-    (scans / "a.ply").write_text("no")
-    assert run() == {"a": "new"}  # such a line counts for nothing
-    assert treasure.read_text() == "kept"
 
 
 def test_bad_files_stop_nothing_and_say_why(run, scans, rows, tmp_path):
@@ -206,20 +165,6 @@ def test_bad_files_stop_nothing_and_say_why(run, scans, rows, tmp_path):
     assert any("1 of 257 lines hold no point" in message for message in odd["messages"])
 
 
-@pytest.mark.parametrize("change", [{"path": "/no/where/a.ply"}, {"out_dir": "/no/where"}])
-def test_workers_that_see_other_files(scans, rows, tmp_path, change):
-    class Elsewhere(ThreadPoolExecutor):
-        def submit(self, work, task):
-            return super().submit(work, replace(task, **change))
-
-    with Elsewhere(1) as pool:
-        run_batch(scans / "a.ply", tmp_path / "out", executor=pool)
-    error = rows()["a"]["error"]
-    assert "no such f" in error
-    hint = r"\(on .+, process \d+; there is one here: workers need the same files by the same paths\)$"
-    assert re.search(hint, error)
-
-
 def test_a_writer_that_fails_and_a_mistake_in_the_code(run, scans, rows, monkeypatch):
     run([scans / "a.ply"], formats=["ply", "swc"])
     found = rows()["a"]
@@ -229,20 +174,7 @@ def test_a_writer_that_fails_and_a_mistake_in_the_code(run, scans, rows, monkeyp
     assert rows()["a"]["outputs"] == ["a.swc", "a.png"]
     monkeypatch.setattr(glsk_o3d.Refiner, "_run", lambda *_: 1 / 0)
     run([scans / "b.ply"])
-    assert re.fullmatch(r"ZeroDivisionError: division by zero \(test_run\.py, line \d+\)", rows()["b"]["error"])
-
-
-def test_outliers_are_counted(run, write, rows, tmp_path):
-    run(write(tmp_path / "a.xyz", points=np.concatenate([torus(1024).points, [[3, 0, 0], [0, 3, 0]]])))
-    row = rows()["a"]
-    assert (row["points"], row["sampled"], row["outliers"]) == (1026, 1026, 2)
-
-
-def test_a_name_that_is_no_unicode(run, write, rows, tmp_path):
-    write(tmp_path / "in" / os.fsdecode(b"\xff.ply"))
-    run()
-    assert os.fsdecode(b"\xff") in rows()
-    assert run() == {}
+    assert rows()["b"]["error"] == "ZeroDivisionError: division by zero"
 
 
 @pytest.mark.parametrize("where", [None, "x > -100"])
@@ -274,7 +206,6 @@ class TestRefusals:
             ({"formats": []}, "nothing to write"),
             ({"workers": 0}, "workers = 0"),
             ({"workers": 1.5}, "workers = 1.5: must be an int"),
-            ({"format": "ply"}, "no option of a batch is called 'format': did you mean 'formats'"),
             ({"workers": 2, "scheduler": "tcp://x:1"}, "neither workers nor"),
         ],
     )
@@ -293,36 +224,6 @@ class TestRefusals:
         with pytest.raises(InvalidParameterError, match=r"a\.ply: is an input"):
             plan_batch([scans / "a.ply", scans / "b.ply"], scans)
 
-    def test_two_batches_in_one_folder(self, scans, tmp_path):
-        (tmp_path / "out").mkdir()
-        with locked(tmp_path / "out"), pytest.raises(BatchError, match="another batch"):
-            run_batch(scans, tmp_path / "out")
-
-    def test_a_plan_writes_nothing(self, scans, tmp_path):
-        plan = plan_batch(scans, tmp_path / "out", formats=["ply", ".JSON", "json"], preview=True)
-        assert plan.tasks[0].outputs == ("a.ply", "a.json", "a.png")
-        assert (plan.skipped, len(plan.parameters)) == (0, 64)
-        assert not (tmp_path / "out").exists()
-
-
-def test_two_results_are_not_one_file(write, tmp_path):
-    for folder in ("one", "two"):
-        write(tmp_path / "in" / folder / "s.ply", seed=0)
-    (tmp_path / "out" / "one").mkdir(parents=True)
-    (tmp_path / "out" / "two").symlink_to("one")
-    with pytest.raises(InvalidParameterError, match=r"two/s\.ply: a link makes it the same file as one/s\.ply"):
-        run_batch(tmp_path / "in", tmp_path / "out", recursive=True)
-
-
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes")
-@pytest.mark.parametrize("name", ["ledger.jsonl", "ledger.csv", ".ledger.lock"])
-def test_pipes_among_the_results_are_refused(write, tmp_path, name):
-    write(tmp_path / "in" / "s.ply", seed=0)
-    (tmp_path / "out").mkdir()
-    os.mkfifo(tmp_path / "out" / name)
-    with pytest.raises(InvalidParameterError, match=rf"{re.escape(name)}: is a pipe or a device"):
-        run_batch(tmp_path / "in", tmp_path / "out")
-
 
 @pytest.mark.parametrize("link", ["sub", "sub/s.ply", "ledger.jsonl", "ledger.csv", "recipe.json", ".ledger.lock"])
 def test_no_link_leads_out_of_the_output_folder(write, tmp_path, link):
@@ -334,9 +235,7 @@ def test_no_link_leads_out_of_the_output_folder(write, tmp_path, link):
     (out / "ledger.jsonl").touch()
     (out / link).unlink(missing_ok=True)
     (out / link).symlink_to(victim if link == "sub" else victim / "kept")
-    with pytest.raises(
-        InvalidParameterError, match=rf"{re.escape(link)}.*: a link leads out of the output folder, to "
-    ):
+    with pytest.raises(InvalidParameterError, match=rf"{re.escape(link)}.*: leads out of the output folder, to "):
         run_batch(tmp_path / "in", out, recursive=True, workers=1)
     assert [path.name for path in victim.iterdir()] == ["kept"]
     assert (victim / "kept").read_text() == "kept"

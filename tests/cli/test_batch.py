@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from glsk_o3d import read_skeleton
-from glsk_o3d.batch import run_batch
 from glsk_o3d.cli.console import progress
 from glsk_o3d.samples import torus
 
@@ -48,23 +47,6 @@ def counts(monkeypatch):
     return counts
 
 
-@pytest.mark.usefixtures("no_run", "folder")
-@pytest.mark.parametrize(
-    ("code", "words", "message"),
-    [
-        (1, "none", "none: no such file or folder"),
-        (1, ".", "sub-folders are taken with recursive"),
-        (2, "in --format stl", "unknown ending; known are .ply"),
-        (2, "in --format ,", "nothing to write"),
-        (2, "in --pipeline cao2010 --recipe r.json", "give one of them"),
-        (2, "in --set Connector.radios=1", "did you mean 'radius'?"),
-        (2, "in --workers 2 --scheduler tcp://x:1", "give neither workers"),
-    ],
-)
-def test_typos_leave_nothing_behind(refused, code, words, message):
-    assert message in refused(code, "batch", *words.split(), "-o", "out")
-
-
 def test_some_fail(invoke, folder, tmp_path):
     words = ("batch", "in", "-o", "out", "--format", "ply, json", "--preview")
     result = invoke(*words)
@@ -81,7 +63,6 @@ def test_some_fail(invoke, folder, tmp_path):
     told = json.loads(result.stdout)
     assert (told["done"], told["skipped"], told["failed"]) == (0, 2, 1)
     assert [failure["input"] for failure in told["failures"]] == [str(folder / "bad.ply")]
-    assert told["ledger"] == str(tmp_path / "out" / "ledger.jsonl")
     (folder / "bad.ply").unlink()
     assert invoke(*words, "--quiet").output == ""
 
@@ -98,25 +79,21 @@ def test_dry_run(invoke, folder, tmp_path):
     before = sorted(path.stat().st_mtime_ns for path in (tmp_path / "out").iterdir())
     assert told().stdout == f"{folder / 'bad.ply'} (failed before) -> bad.ply\n1 to do, 2 to skip\n"
     facts = json.loads(told("--json", "--set", "Connector.radius=3%").stdout)
-    assert facts["todo"] == 3
     assert [task["why"] for task in facts["tasks"]] == ["other parameters"] * 2 + ["failed before"]
     assert json.loads(told("--json", "--force").stdout)["tasks"][0]["why"] == "asked for"
     assert sorted(path.stat().st_mtime_ns for path in (tmp_path / "out").iterdir()) == before
-    for name in "abcdefg":
-        (folder / f"{name}.md").touch()
-    assert "left out 7: no cloud by its ending, .md (a.md, b.md, c.md, d.md, e.md, ...)" in told().stderr
+    (folder / "a.md").touch()
+    assert "left out 1: no cloud by its ending, .md" in told().stderr
     assert told("--quiet").output == ""
 
 
 def test_options_reach_the_run(invoke, folder, scans, tmp_path, counts):
-    words = ("--workers", "2", "--set", "Connector.radius=5%", "--pipeline", "wen2024", "--verbose")
-    result = invoke("batch", "in/a.ply", "in/b.ply", "-o", "out", "--format", "npz", *words)
-    assert f"glsk: {folder / 'a.ply'}: " in result.stderr
+    words = ("--workers", "2", "--set", "Connector.radius=5%", "--pipeline", "wen2024")
+    invoke("batch", "in/a.ply", "in/b.ply", "-o", "out", "--format", "npz", *words)
     stages = read_skeleton(tmp_path / "out" / "a.npz").report.stages
     assert any("Connector(radius='5%'" in stage for stage in stages)
     assert any("RingBuilder(k='published'" in stage for stage in stages)
-    run_batch(folder, tmp_path / "out", workers=64)
-    assert counts == [2, 3]  # no more workers than scans
+    assert counts == [2]
     assert "2 of 1000 points" in invoke("batch", scans / "nan.ply", "-o", "out").stderr
     assert invoke("batch", scans / "nan.ply", "-o", "out", "--drop-invalid").exit_code == 0
 
@@ -128,26 +105,25 @@ def test_progress_tells_how_many_and_how_long(monkeypatch):
 
     screen = Terminal()
     monkeypatch.setattr("sys.stderr", screen)
-    with progress(True, remaining=True) as update:
-        update("3 scans/s, 1 failed", 7, 10)
+    with progress(remaining=True) as update:
+        update("done: a.ply", 7, 10)
     plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.getvalue())
-    assert re.search(r"3 scans/s, 1 failed .* 7/10 left: -?\S+", plain)
+    assert re.search(r"done: a\.ply .* 7/10 left: -?\S+", plain)
 
 
 def test_one_skeleton_per_tree_of_a_plot_and_one_of_a_scene_in_tiles(invoke, tmp_path):
     rings = np.concatenate([torus(300).points + [3 * i, 0, 0] for i in range(3)])
     table = np.column_stack([rings, np.repeat([0, 7, 9], 300)])
-    (tmp_path / "in").mkdir()
-    np.savetxt(tmp_path / "in" / "plot.csv", table, delimiter=",", header="x,y,z,treeID", comments="")
-    (tmp_path / "in" / "README.md").touch()
-    words = ["batch", "in", "-o", "out", "--by", "treeID", "--where", "treeID > 0", "--json"]
-    told = json.loads(invoke(*words).stdout)
+    np.savetxt(tmp_path / "plot.csv", table, delimiter=",", header="x,y,z,treeID", comments="")
+    told = json.loads(
+        invoke("batch", "plot.csv", "-o", "out", "--by", "treeID", "--where", "treeID > 0", "--json").stdout
+    )
     assert (told["done"], told["failed"]) == (2, 0)
-    assert told["left_out"] == {str(tmp_path / "in" / "README.md"): "no cloud by its ending, .md"}
     assert read_skeleton("out/plot-9.ply").vertices[:, 0].min() > 5
-    words = ["batch", "in/plot.csv", "-o", "tiles", "--tiles", "3", "--overlap", "0.5", "--json"]
-    plan = json.loads(invoke(*words, "--dry-run").stdout)
-    assert plan["tasks"][0]["input"] == f"{tmp_path}/in/plot.csv tile 0-0-0"
+    words = ["batch", "plot.csv", "-o", "tiles", "--tiles", "3", "--overlap", "0.5", "--json"]
     told = json.loads(invoke(*words).stdout)
-    assert (told["done"], told["failed"]) == (plan["todo"], 0)
+    assert (told["done"] > 3, told["failed"]) == (True, 0)
+    plan = json.loads(invoke(*words, "--dry-run").stdout)
+    assert plan["tasks"][0]["input"] == f"{tmp_path}/plot.csv tile 0-0-0"
+    assert (plan["todo"], plan["skipped"]) == (0, told["done"])
     assert read_skeleton("tiles/plot.ply").n_loops == 3

@@ -52,22 +52,16 @@ def test_from_nothing_to_a_table(invoke, rods, program, tmp_path):
     assert json.loads((tmp_path / "t.json").read_text())["entries"][0]["name"] == "good"
 
 
-def test_choices_may_be_repeated(invoke, rods):
-    words = ("--families", "tubes", "--families", "trees", "--seeds", "100", "--seeds", "101", "--variants", "clean")
-    made = invoke("benchmark", "make", "bench", *words, "--variants", "scan2", "--jobs", 1, "--json")
-    assert (json.loads(made.stdout)["shapes"], json.loads(made.stdout)["clouds"]) == (4, 8)
-
-
 def test_json(invoke, rods, program):
-    made = json.loads(invoke("benchmark", "make", "bench", *CHOICE, "--json").stdout)
+    words = ("--families", "tubes", "--families", "trees", "--seeds", "100", "--seeds", "101", "--variants", "clean")
+    made = json.loads(invoke("benchmark", "make", "bench", *words, "--variants", "scan2", "--jobs", 1, "--json").stdout)
     assert (made["clouds"], made["scored"], made["whole"]) == (8, 7, False)
     command = quoted(program("if name == 'tubes_100_clean': sys.exit(1)\nwrite(skeleton)"))
     words = ("benchmark", "run", "bench", "out", "--command", command, "--ending", ".obj", "--json")
     ran = invoke(*words)
     assert ran.stderr == "glsk: warning: tubes_100_clean: exit code 1\n"
     assert json.loads(ran.stdout)["failures"] == {"tubes_100_clean": "exit code 1"}
-    again = invoke(*words, "--retry", "-q")
-    assert (json.loads(again.stdout)["skipped"], again.stderr) == (6, "")
+    assert json.loads(invoke(*words, "--retry", "-q").stdout)["skipped"] == 6
     words = ("-o", "s.json", "--name", "mine", "--json")
     scored = json.loads(invoke("benchmark", "score", "bench", "out", *words).stdout)
     assert (scored["name"], scored["failures"], scored["files"]) == ("mine", 1, ["s.json"])
@@ -118,18 +112,11 @@ def test_several_clouds_of_each_object(invoke, rods, program, tmp_path):
     [
         (2, ("make", "new", "--seeds", "a:b"), "--seeds a:b: write FIRST:BEYOND"),
         (2, ("make", "new", "--families", "tube"), "did you mean 'tubes'"),
-        (2, ("make", "new", "--version", "v9"), "no version of the benchmark is called 'v9'"),
         (1, ("run", "none", "out"), "make a benchmark with 'glsk benchmark make none' first"),
         (2, ("run", "bench", "out", "--command", "true {cloud}"), "has no {skeleton}"),
-        (2, ("run", "bench", "out", "--pipeline", "defualt"), "did you mean 'default'"),
         (1, ("score", "bench", "none", "-o", "s.json"), "no such folder of answers"),
-        (1, ("score", "bench", "bench", "-o", "s.json"), "has no answer to any cloud"),
         (2, ("score", "bench", "bench", "-o", "s.csv"), "its name ends in .json"),
         (1, ("sample", "new", "none"), "none: has no meshes"),
-        (2, ("sample", "new", "--version", "v0"), "no version of the benchmark is called 'v0'"),
-        (1, ("repeat", "bench", "none"), "no such folder of answers"),
-        (2, ("repeat", "bench", "bench", "-o", "r.csv"), "its name ends in .json"),
-        (1, ("table", "none.json"), "none.json: no such file"),
         (1, ("table", "bench/benchmark.json"), "not the scores of a benchmark"),
         (2, ("table", "bench/benchmark.json", "-o", "t.csv"), "its name ends in .md or .json"),
     ],

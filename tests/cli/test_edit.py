@@ -24,24 +24,20 @@ def file(tmp_path):
 
 
 def test_edits_one_after_the_other(invoke, file, tmp_path):
-    words = ["--largest", "--cut-loops", "--root", "x", "--prune-length", "0.5", "--smooth", "2", "--vertices", "5"]
+    words = ["--largest", "--cut-loops", "--root", "x", "--prune-length", "0.5", "--simplify", "0.6"]
     result = invoke("edit", file, "-o", "new.swc", "-o", "new.json", *words)
     assert result.exit_code == 0, result.output
-    done = ["kept one of 2 components", "cut a loop at (", "grows from (-1, ", "pruned 1 of ", "smoothed in 2 passes"]
-    done += ["kept 5 of 14 vertices", "vertices 17 -> 5, edges 16 -> 4, components 2 -> 1, loops 1 -> 0, "]
-    done.append("wrote new.swc")
-    lines = result.stdout.splitlines()
-    assert all(line.startswith(start) for line, start in zip(lines, done, strict=False))
+    counts, first, second = result.stdout.splitlines()
+    assert counts.startswith("vertices 17 -> 6, edges 16 -> 5, components 2 -> 1, loops 1 -> 0, ")
+    assert (first, second) == ("wrote new.swc", "wrote new.json")
     new = read_skeleton(tmp_path / "new.json")
     told = json.loads(invoke("edit", file, "-o", "again.json", *words, "--json").stdout)
-    assert told["done"] == lines[:6]
-    assert [told[when]["vertices"] for when in ("before", "after")] == [17, 5]
+    assert [told[when]["vertices"] for when in ("before", "after")] == [17, 6]
     assert told["files"] == ["again.json"]
-    assert invoke("edit", file, "-o", "same.ply").stdout == "all counts are as before\nwrote same.ply\n"
-    assert (new.n_components, new.n_loops, len(new.vertices)) == (1, 0, 5)
+    assert (new.n_components, new.n_loops, new.vertices[0, 0]) == (1, 0, new.vertices[:, 0].min())
     assert read_skeleton(tmp_path / "new.swc").length == pytest.approx(new.length)
-    result = invoke("edit", file, "-o", "new.ply", "--simplify", 10, "-q")
-    assert (result.exit_code, result.output) == (0, "")
+    assert invoke("edit", file, "-o", "same.ply").stdout == "all counts are as before\nwrote same.ply\n"
+    assert invoke("edit", file, "-o", "new.ply", "--simplify", 10, "-q").output == ""
     assert read_skeleton(tmp_path / "new.ply").n_loops == 1
 
 
@@ -50,16 +46,14 @@ def test_convert(invoke, file, tmp_path):
     assert result.stdout == "wrote a.ply\nwrote a.graphml\nwrote a.obj\n"
     for name in ("a.ply", "a.graphml", "a.obj"):
         assert read_skeleton(tmp_path / name).n_loops == 1
-    assert invoke("convert", file, "a.swc", "--cut-loops").exit_code == 0
+    assert invoke("convert", file, "a.swc", "--cut-loops", "--json").stdout == '{\n  "files": [\n    "a.swc"\n  ]\n}\n'
 
 
 @pytest.fixture
 def line(tmp_path):
     """Three edges along x, from the thin end to the thick one."""
-    edges = [(0, 1), (1, 2), (2, 3)]
-    save_skeleton(
-        Skeleton([[x, 0, 0] for x in range(-1, 3)], edges, [0.1, 0.2, 0.3, 0.4], (), (), ()), tmp_path / "line.json"
-    )
+    along, edges = [[x, 0, 0] for x in range(-1, 3)], [(0, 1), (1, 2), (2, 3)]
+    save_skeleton(Skeleton(along, edges, [0.1, 0.2, 0.3, 0.4], (), (), ()), tmp_path / "line.json")
     return "line.json"
 
 
@@ -68,13 +62,12 @@ def line(tmp_path):
 )
 def test_a_root_in_all_words(invoke, line, tmp_path, word, x):
     names = [f"t.{name}" for name in ("swc", "urdf", "glb")]
-    result = invoke("convert", line, *names, "--root", word)
-    assert (result.exit_code, result.stderr) == (0, ""), result.output
+    assert invoke("convert", line, *names, "--root", word).stderr == ""
     for name in names:
         save_skeleton(read_skeleton(line), tmp_path / f"expected-{name}", root=[x, 0, 0])
         assert (tmp_path / name).read_bytes() == (tmp_path / f"expected-{name}").read_bytes()
-    assert read_skeleton(tmp_path / "t.swc").vertices[0].tolist() == [x, 0, 0]
-    assert invoke("edit", line, "-o", "e.json", "--root", word).stdout.startswith(f"grows from ({x}, 0, 0)\n")
+    assert invoke("edit", line, "-o", "e.json", "--root", word).exit_code == 0
+    assert read_skeleton("e.json").vertices[0].tolist() == [x, 0, 0]
 
 
 def test_a_root_is_for_formats_of_trees(invoke, line):
@@ -100,30 +93,31 @@ def cloud(tmp_path):
     return points
 
 
+def same_bytes(*paths):
+    first, second = (path.read_bytes() for path in paths)
+    return first == second
+
+
 @pytest.mark.parametrize("ending", ["ply", "obj", "stl"])
 def test_a_mesh_hangs_on_the_bones(invoke, tmp_path, y, ending):
     octahedron = o3d.geometry.TriangleMesh.create_octahedron()
     octahedron.compute_triangle_normals()
     assert o3d.io.write_triangle_mesh(str(tmp_path / f"mesh.{ending}"), octahedron, write_triangle_uvs=False)
     result = invoke("rig", y, f"mesh.{ending}", "-o", "r.glb", "--root", "0,0,-0.5", "--up", "y")
-    assert (result.exit_code, result.stderr) == (0, "")
-    skeleton, mesh = read_skeleton(tmp_path / y), read_mesh(tmp_path / f"mesh.{ending}")
-    bones = save_rig(skeleton, tmp_path / "expected.glb", mesh, root=(0, 0, -0.5), up="y")
-    told = f"{len(bones.edges)} bones move {len(mesh.vertices)} vertices and 8 triangles\nwrote r.glb\n"
-    assert result.stdout == told
-    assert (tmp_path / "r.glb").read_bytes() == (tmp_path / "expected.glb").read_bytes()
+    mesh = read_mesh(tmp_path / f"mesh.{ending}")
+    bones = save_rig(read_skeleton(tmp_path / y), tmp_path / "expected.glb", mesh, root=(0, 0, -0.5), up="y")
+    assert result.stdout == f"{len(bones.edges)} bones\nwrote r.glb\n"
+    assert same_bytes(tmp_path / "r.glb", tmp_path / "expected.glb")
 
 
 @pytest.mark.parametrize("ending", ["ply", "xyz"])
 def test_a_cloud_hangs_on_the_bones(invoke, tmp_path, y, cloud, ending):
-    result = invoke("rig", y, f"cloud.{ending}", "-o", "r.glb", "--root", "2")
-    assert f" bones move {len(cloud)} points\n" in result.stdout
+    assert invoke("rig", y, f"cloud.{ending}", "-o", "r.glb", "--root", "2").exit_code == 0
     save_rig(read_skeleton(tmp_path / y), tmp_path / "expected.glb", cloud, root=2)
-    assert (tmp_path / "r.glb").read_bytes() == (tmp_path / "expected.glb").read_bytes()
+    assert same_bytes(tmp_path / "r.glb", tmp_path / "expected.glb")
 
 
 def test_alone_it_has_its_tubes_and_loops_are_cut_if_one_says_so(invoke, ring_file, tmp_path):
-    result = invoke("rig", ring_file, "-o", "r.glb", "--cut-loops")
-    bones = save_rig(read_skeleton(tmp_path / ring_file), tmp_path / "expected.glb", cut_loops=True)
-    assert result.stdout == f"{len(bones.edges)} bones move the skeleton's own surface\nwrote r.glb\n"
-    assert (tmp_path / "r.glb").read_bytes() == (tmp_path / "expected.glb").read_bytes()
+    assert invoke("rig", ring_file, "-o", "r.glb", "--cut-loops").exit_code == 0
+    save_rig(read_skeleton(tmp_path / ring_file), tmp_path / "expected.glb", cut_loops=True)
+    assert same_bytes(tmp_path / "r.glb", tmp_path / "expected.glb")

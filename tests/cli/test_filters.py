@@ -49,12 +49,13 @@ def test_json_has_every_field(invoke):
     for each in told["filters"]:
         cls = catalogue()[each["name"]]
         assert each["kind"] == ("filter" if issubclass(cls, Filter) else "stopping rule")
-        flows = ("cloud", "Points", "Contraction", "Skeleton") if issubclass(cls, Filter) else (None,)
-        assert {each["consumes"], each["produces"]} <= set(flows)
-        assert [p["name"] for p in each["parameters"]] == [f.name for f in dataclasses.fields(cls)]
         for parameter, field in zip(each["parameters"], dataclasses.fields(cls), strict=True):
             plain = field.default if not dataclasses.is_dataclass(field.default) else repr(field.default)
-            assert (parameter["type"], parameter["default"]) == (field.metadata["type"], plain)
+            assert [parameter[key] for key in ("name", "type", "default")] == [
+                field.name,
+                field.metadata["type"],
+                plain,
+            ]
     expressions = {each["name"]: each["expression"] for each in told["pipelines"]}
     assert expressions == {name: repr(make()) for name, make in PIPELINES.items()}
 
@@ -76,7 +77,7 @@ def glsk(monkeypatch):
 
     def run(*words, entries=None):
         if entries is not None:
-            found = [("some 1", EntryPoint(name, value, main.COMMAND_GROUP)) for name, value in entries.items()]
+            found = [EntryPoint(name, value, main.COMMAND_GROUP) for name, value in entries.items()]
             monkeypatch.setattr(main, "entry_points", lambda group, problems: found)
         app = typer.Typer()
         app.command("own")(lambda: None)
@@ -109,8 +110,6 @@ def test_what_is_broken_or_no_application_is_left_out(glsk, capsys, value):
 
 
 def test_a_malformed_file_of_another_distribution_stops_no_command(glsk, install, capsys):
-    install("glsk-odd", "1", "", "[glsk_o3d.commands\nx = json:dumps\n")
+    install("glsk-odd", "1", "", "[glsk_o3d.commands]\nno equals sign\n")
     assert glsk("own").exit_code == 0
-    warning = capsys.readouterr().err
-    assert warning.count("\n") == 1
-    assert warning.startswith("glsk: warning: the plugins of glsk-odd left out: its entry_points.txt is malformed: ")
+    assert capsys.readouterr().err.startswith("glsk: warning: all plugins left out: ")

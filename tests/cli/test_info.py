@@ -6,10 +6,12 @@ import sys
 from dataclasses import replace
 
 import numpy as np
+import open3d as o3d
 import pytest
-from matplotlib.image import imread
 
-from glsk_o3d import Decision, read_skeleton, save_skeleton
+from glsk_o3d import Decision, read_skeleton, save_skeleton, save_tensor_cloud
+from glsk_o3d.io import streaming
+from glsk_o3d.io.scans import read_blocks
 
 
 @pytest.fixture
@@ -61,21 +63,16 @@ def test_skeletons_of_every_format_and_the_report_of_the_run(told, skeleton, inv
         assert facts["length"] == pytest.approx(it.length)
         assert (facts["radii"] is None) == bool(np.isnan(it.radii).all())
     facts, report = told("s.npz"), skeleton["s.npz"].report
-    assert (facts["stop_reason"], facts["repeatable"]) == (report.stop_reason, True)
-    assert set(facts["stages"]) == set(report.stages)
+    assert facts["stop_reason"] == report.stop_reason
+    assert facts["stages"] == list(report.stages)
     assert [each["n_points"] for each in facts["iterations"]] == [each.n_points for each in report.iterations]
     table = invoke("info", "s.npz").stdout
-    assert "Connector(radius='4%')\n" in table  # what is not the default of the filter
-    assert re.search(r"^radii +[\d.]+ to [\d.]+$", table, re.MULTILINE)
-    assert re.search(r"^stages +Sampler\n +OutlierRemover", table, re.MULTILINE)
+    assert re.search(r"^radii +[\d.]+ [\d.]+$", table, re.MULTILINE)
+    assert re.search(r"^stages +Sampler OutlierRemover", table, re.MULTILINE)
     assert all(f"{each.explained:.4f}" in table for each in report.iterations)
     call = Decision("gap", (1.0, 2.0, 3.0), 0.45, changed=False)
     save_skeleton(replace(skeleton["s.json"], report=replace(report, decisions=(call,))), tmp_path / "close.json")
     assert told("close.json")["uncertain"] == [str(call)]
-    data = json.loads((tmp_path / "s.json").read_text())
-    data["report"]["recipe"]["pipeline"].insert(0, {"filter": "Slab"})  # which is not installed
-    (tmp_path / "s.json").write_text(json.dumps(data))
-    assert told("s.json")["repeatable"] is False
 
 
 def test_a_mesh_is_a_cloud(told, invoke, tmp_path):
@@ -84,25 +81,24 @@ def test_a_mesh_is_a_cloud(told, invoke, tmp_path):
     assert (facts["kind"], facts["points"], facts["triangles"]) == ("cloud", 3, 1)
     assert "m.obj: the 3 vertices of this mesh are far apart" in invoke("info", "m.obj").stderr
     assert invoke("info", "m.obj", "-q").output == ""
-    assert json.loads(invoke("info", "m.obj", "-q", "--json").stdout)["points"] == 3
 
 
 def test_coordinates_of_a_map_keep_their_digits(invoke, told, tmp_path):
     corner = np.array([471234.5678, 5612345.6789, 123.4567])
     np.savetxt(tmp_path / "far.xyz", corner + np.eye(3), fmt="%.4f")
     assert told("far.xyz")["lowest"] == corner.tolist()
-    assert "471234.56780  5612345.67890  123.45670" in invoke("info", "far.xyz").stdout
+    assert "471234.5678  5612345.679  123.4567" in invoke("info", "far.xyz").stdout
 
 
 def test_attributes_and_conditions_on_them(invoke, told, refused, tmp_path):
     rows = [f"{i},{i * i},0,{i % 3},{i / 7}" for i in range(30)]
     (tmp_path / "c.csv").write_text("\n".join(["x,y,z,Tree ID,intensity", *rows]))
     facts = told("c.csv")["attributes"]
-    assert facts["Tree_ID"] == {"distinct": 3, "lowest": 0, "highest": 2, "counts": {"0": 10, "1": 10, "2": 10}}
-    assert facts["intensity"] == {"distinct": 30, "lowest": 0.0, "highest": 29 / 7}
+    assert facts["Tree_ID"] == {"lowest": 0, "highest": 2, "counts": {"0": 10, "1": 10, "2": 10}}
+    assert facts["intensity"] == {"lowest": 0.0, "highest": 29 / 7}
     text = invoke("info", "c.csv").stdout
     assert "Tree_ID 0 (10 points), 1 (10 points), 2 (10 points)" in text
-    assert "intensity 0 to 4.142857143, 30 values" in text
+    assert "intensity 0 to 4.142857143\n" in text
     assert json.loads(invoke("info", "c.csv", "--where", "Tree_ID == 2 and x > 4", "--json").stdout)["points"] == 9
     assert "did you mean 'Tree_ID'" in refused(2, "info", "c.csv", "--where", "treeid == 2")
     assert refused(1, "info", "c.csv", "--where", "x > 99") == "there is no point with x > 99"
@@ -121,12 +117,6 @@ def test_without_a_file_it_lists_what_can_be_read_and_what_is_missing(invoke, mo
 
 
 def test_a_large_cloud_is_told_block_by_block(told, tmp_path, monkeypatch):
-    import open3d as o3d
-
-    from glsk_o3d import save_tensor_cloud
-    from glsk_o3d.io import streaming
-    from glsk_o3d.io.scans import read_blocks
-
     random = np.random.default_rng(2)
     places = random.normal(size=(500, 3))
     places[77] = np.nan
@@ -138,7 +128,6 @@ def test_a_large_cloud_is_told_block_by_block(told, tmp_path, monkeypatch):
     monkeypatch.setattr(streaming, "LARGE_CLOUD", 499)
     monkeypatch.setitem(read_blocks.__kwdefaults__, "rows", 60)
     found = told(tmp_path / "c.ply")
-    assert whole["attributes"]["time"].pop("distinct") == 500
     assert found == {name: whole[name] for name in whole if name not in ("duplicates", "median_spacing", "triangles")}
 
 
@@ -163,32 +152,30 @@ def test_without_a_display_it_names_what_else_there_is(glsk, monkeypatch, y):
     assert run.stderr.count("\n") == 1
 
 
-def test_a_window_shows_a_skeleton_or_a_scan(invoke, scans, tmp_path, y, shown):
-    assert invoke("view", y).exit_code == invoke("view", scans / "sample.ply").exit_code == 0
-    (skeleton, none, options), (empty, cloud, _) = shown
+def test_a_window_shows_a_skeleton_or_a_scan_and_its_labels_in_colour(invoke, scans, tmp_path, y, shown):
+    (tmp_path / "c.csv").write_text("x,y,z,label\n0,0,0,1\n0,0,1,2\n0,1,1,2\n1,1,1,-1\n")
+    for file in (y, scans / "sample.ply", "c.csv"):
+        assert invoke("view", file).exit_code == 0
+    (skeleton, none, options), (empty, cloud, _), (_, labelled, _) = shown
     assert none is None
     assert repr(skeleton) == repr(read_skeleton(tmp_path / y))
     assert options == {"title": "y.ply"}
-    assert len(empty.vertices) == 0
-    assert len(cloud.points) == len(empty.points) == 1100
+    assert (len(empty.vertices), len(cloud.points), len(empty.points)) == (0, 1100, 1100)
+    colours = np.asarray(labelled.colors)
+    assert len(np.unique(colours, axis=0)) == 3
+    assert (colours[1] == colours[2]).all()
 
 
-def test_a_labelled_scan_is_shown_in_colour(invoke, tmp_path, shown, y):
-    (tmp_path / "c.csv").write_text("x,y,z,label,height\n0,0,0,1,0\n0,0,1,2,5\n0,1,1,2,9\n1,1,1,-1,nan\n")
-    assert all(invoke("view", "c.csv", *words).exit_code == 0 for words in ((), ("--color", "height")))
-    labels, heights = (np.asarray(cloud.colors) for _, cloud, _ in shown)
-    assert len(np.unique(labels, axis=0)) == 3
-    assert (labels[1] == labels[2]).all()
-    assert (labels[3] == heights[3]).all()  # grey
-    assert heights[0, 2] > heights[0, 0]  # dark blue
-    assert heights[2, 0] > 0.9 > heights[2, 2]  # yellow
-    assert invoke("view", "c.csv", "--preview", "p.png").exit_code == 0
-    coloured = np.ptp(imread(tmp_path / "p.png")[..., :3], axis=-1) > 0.3
-    assert coloured.sum() > 20
-    assert "did you mean 'label'" in invoke("view", "c.csv", "--color", "lable").stderr
-    assert "--color is for scans" in invoke("view", y, "--color", "branch").stderr
-    assert "a page draws" in invoke("view", "c.csv", "--color", "height", "--report", "r.html").stderr
-    assert not (tmp_path / "r.html").exists()
+def test_points_are_coloured_by_the_attribute_that_is_asked_for(invoke, refused, tmp_path, y, shown):
+    (tmp_path / "c.csv").write_text("x,y,z,label,angle\n0,0,0,1,0\n0,0,1,2,5\n0,1,1,2,9\n1,1,1,-1,nan\n")
+    assert invoke("view", "c.csv", "--color", "angle").exit_code == 0
+    colours = np.asarray(shown.pop()[1].colors)
+    assert colours[0, 2] > colours[0, 0]  # dark blue
+    assert colours[2, 0] > 0.9 > colours[2, 2]  # yellow
+    assert np.ptp(colours[3]) < 0.1 < np.ptp(colours[1])  # grey is what is no number
+    assert "did you mean 'label'" in refused(2, "view", "c.csv", "--color", "lable")
+    assert "--color is for scans" in refused(2, "view", y, "--color", "branch")
+    assert "--color is for the window" in refused(2, "view", "c.csv", "--color", "angle", "--preview", "p.png")
 
 
 def test_files_instead_of_a_window(invoke, scans, shown, tmp_path, y):

@@ -1,11 +1,11 @@
 """What the commands refuse: in one line that says what was wrong and where, before they write anything."""
 
 import numpy as np
-import open3d as o3d
 import pytest
 
 from glsk_o3d import Skeleton, read_skeleton, samples, save_skeleton
 
+SCRIPT = '<FilterScript>\n<filter name="{}"/></FilterScript>'
 TABLE = """
     1 branches z.ply                                       | z.ply: no such file
     1 branches SCANS/ring.ply                              | ring.ply: is a cloud, not a skeleton: make one with
@@ -14,24 +14,18 @@ TABLE = """
     2 branches y.ply --root 4                              | root = 4: there are vertices 0 to 3
     2 branches y.ply -o y.txt                              | y.txt: the table is CSV and its name ends in .csv
     2 tree y.ply --root a,b,c                              | root = 'a,b,c': must be an axis
-    2 tree y.ply --up w                                    | up = 'w': must be
     2 tree y.ply --unit 0                                  | unit = '0': must be metres, above 0, or one of m, cm, mm
     2 tree o.ply                                           | 1 loops: cylinders need a tree; see pipelines.tree()
     2 tree two.json                                        | 2 components: cylinders need one tree
     2 tree y.ply -o c.xlsx                                 | c.xlsx: the file is a table of cylinders and its name ends
     2 edit o.ply                                           | nothing to write: give an output with -o
     2 edit o.ply -o o.ply                                  | o.ply: is an input
-    2 edit o.ply -o new.ply --simplify 1 --vertices 3      | simplify needs either a tolerance or n
-    2 edit o.ply -o new.ply --root x                       | only trees have a root; see cut_loops (--cut-loops)
-    2 edit o.ply -o new.ply --prune-order 0                | the skeleton has 1 loops: branches have an order in a tree
     1 convert o.ply a.swc                                  | a.swc: this format holds trees only
     2 convert o.ply a.nope                                 | a.nope: the file is a skeleton and its name ends in
     2 convert y.ply a.ply --root x                         | for others use 'glsk edit'
     2 rig y.ply                                            | nothing to write: give one output with -o
     2 rig y.ply -o a.glb -o b.glb                          | rig writes one file: give one output with -o
     2 rig none.ply -o r.fbx                                | r.fbx: the rig is glTF and its name ends in .glb
-    2 rig y.ply -o r.glb --up x                            | up = 'x': must be one of z, y
-    1 rig y.ply none.ply -o r.glb                          | none.ply: no such file
     1 rig y.ply y.ply -o r.glb                             | y.ply: is a skeleton, not a scan
     1 rig y.ply junk.ply -o r.glb                          | junk.ply: not a valid .ply file: it does not start with
     1 rig y.ply nan.xyz -o r.glb                           | nan.xyz: the surface has points that are not finite: drop
@@ -40,40 +34,61 @@ TABLE = """
     2 grasps rod.npz --opening -1                          | max_opening = -1.0: must be above 0
     2 grasps rod.npz --opening 1 --plane 0,0,1             | --plane 0,0,1: write 4 numbers with commas
     2 grasps rod.npz --opening 1 --plane 0,0,0,1           | is no plane
-    2 grasps rod.npz --opening 1 --cone down,30            | --cone down: write 3 numbers
-    2 grasps rod.npz --opening 1 --cone z                  | --cone z: write a direction and degrees, such as -z,60
+    2 grasps rod.npz --opening 1 --cone z                  | --cone ,z: write 4 numbers
     2 grasps rod.npz --opening 1 --cone z,270              | the angle of cone = 270.0: must be
-    2 grasps rod.npz --opening 1 --up w                    | --up w: write 3 numbers
-    2 grasps rod.npz --opening 1 --finger a,b,c            | --finger a,b,c: write 3 numbers
-    2 grasps rod.npz --opening 1 -o g.txt                  | the grasps are JSON, CSV or PLY and its name ends in .json
+    2 grasps rod.npz --opening 1 -o g.ply                  | the grasps are JSON or CSV and its name ends in .json
     2 grasps y.ply --opening 1                             | has no confidence, perhaps due to its file: give min_con
     2 grasps y.ply --opening 1 --min-confidence 0          | has no points of the object: give cloud=
     1 grasps rod.npz --opening 1 --scene none.ply          | none.ply: no such file
-    1 evaluate y.ply no.ply                                | no.ply: no such file
     1 evaluate y.ply SCANS/ring.ply --truth none.npz       | none.npz: not a valid truth: the truth has no nodes
     1 evaluate dot.ply SCANS/ring.ply                      | dot.ply: the skeleton has no edge with a length
     1 evaluate y.ply few.xyz                               | few.xyz: no part of the skeleton has 6 points around it
     2 evaluate y.ply SCANS/ring.ply -o r.txt               | r.txt: the report is JSON and its name ends in .json
-    2 evaluate y.ply SCANS/ring.ply --preview p.jpg        | p.jpg: the picture is a PNG and its name ends in .png
-    1 crosscheck SCANS/ring.ply --mesh no.xyz              | unknown ending of a mesh
-    1 crosscheck SCANS/ring.ply --mesh SCANS/ball.ply      | ball.ply: no triangles could be read
-    1 crosscheck SCANS/ring.ply --mesh away.ply            | ring.ply: no point of the cloud lies on the mesh
     1 crosscheck SCANS/nan.ply                             | nan.ply: 2 of 1000 points
-    2 crosscheck SCANS/ring.ply --mesh a.off --method poisson | --mesh gives a mesh
-    2 crosscheck SCANS/ring.ply --method alpha             | mesh = 'alpha': must be 'auto', 'ball_pivoting', 'poisson'
-    2 crosscheck SCANS/ring.ply --max-points 5             | max_points = 5: must be None or a whole number of at least
-    2 crosscheck SCANS/ring.ply -o r.txt                   | r.txt: the report is JSON
     1 info SCANS/empty.ply                                 | empty.ply: the file is empty
     1 info none.ply                                        | none.ply: no such file
     1 info bad.json                                        | bad.json: not a valid .json skeleton
-    1 info bad.swc                                         | bad.swc: not a valid .swc skeleton
     1 info bad.docx                                        | bad.docx: unknown ending
-    1 view SCANS/empty.ply                                 | empty.ply: the file is empty
     2 view y.ply --report r.pdf                            | r.pdf: the report is a page and its name ends in .html
-    1 skeletonize y.ply -o a.ply                           | y.ply: is a skeleton, not a scan
     2 filters Contracter                                   | is called 'Contracter': did you mean 'Contractor'?
-    2 demo --pipeline best                                 | there are default
     1 demo -o y.ply                                        | y.ply: is a file, not a folder
+"""
+
+BEFORE_ANY_RUN = """
+    1 skeletonize y.ply -o a.ply                           | y.ply: is a skeleton, not a scan
+    2 skeletonize SCANS/ring.ply                           | nothing to write
+    2 skeletonize SCANS/ring.ply -o s.stl                  | s.stl: the file is a skeleton and its name ends in .ply or
+    2 skeletonize SCANS/ring.ply --preview s.jpg           | s.jpg: the picture is a PNG and its name ends in .png
+    2 skeletonize SCANS/ring.ply --report s.pdf            | s.pdf: the report is a page and its name ends in .html
+    2 skeletonize SCANS/ring.ply --tubes s.xyz             | s.xyz: the tubes are a mesh and its name ends in .ply or
+    2 skeletonize SCANS/ring.ply --labelled s.pcd          | s.pcd: the cloud with labels is PLY and its name ends
+    2 skeletonize SCANS/ring.ply --save-recipe a.yaml -o a.ply | a.yaml: the file is a recipe and its name ends in
+    2 skeletonize SCANS/ring.ply -o s.ply -o ./s.ply       | s.ply: is named twice
+    2 skeletonize SCANS/ring.ply -o SCANS/ring.ply         | is an input
+    1 skeletonize SCANS/ring.ply -o no/where/s.ply         | no/where: no such folder
+    1 skeletonize SCANS/ring.ply -o /proc/s.ply            | /proc/s.ply: no file can be made in this folder
+    1 skeletonize SCANS/ring.ply -o folder.ply             | folder.ply: is a folder or a device, not a file to write to
+    2 skeletonize SCANS/ring.ply -o s.ply --pipeline wen2042 | no pipeline is called 'wen2042': did you mean 'wen2024'?
+    2 skeletonize SCANS/ring.ply -o s.ply --set radios=1   | did you mean 'radius'
+    2 skeletonize SCANS/ring.ply -o s.ply --set Connector.radius=-1 | Connector.radius = -1.0: must be above 0
+    2 skeletonize SCANS/ring.ply -o s.ply --stream --pipeline wen2024 | this pipeline takes all points of a cloud
+    1 skeletonize none.ply -o s.ply                        | none.ply: no such file
+    1 skeletonize SCANS/empty.ply -o s.ply                 | empty.ply: the file is empty
+    1 skeletonize folder.ply -o s.ply                      | folder
+    1 skeletonize SCANS/nan.ply -o s.ply                   | nan.ply: 2 of 1000 points have NaN
+    1 skeletonize none.xyz -o s.ply                        | none.xyz: none of its 20 points has finite coordinates
+    2 run                                                  | a SCRIPT and a SCAN are needed
+    2 run glskeleton SCANS/ring.ply                        | nothing to write
+    2 run glskeletn SCANS/ring.ply -o s.ply                | no filter script is called 'glskeletn': did you mean
+    1 run none.mlx SCANS/ring.ply -o s.ply                 | none.mlx: no such file
+    1 run bad.mlx SCANS/ring.ply -o s.ply                  | bad.mlx, line 2: no filter is called 'Generate Skeletn'
+    2 run glskeleton SCANS/ring.ply -o s.stl               | s.stl: unknown ending; known are .ply
+    2 run points.mlx SCANS/ring.ply -o s.json              | s.json: unknown ending for points or mesh; known are .ply
+    1 run glskeleton y.ply -o t.json                       | the current layer (y.ply) is a skeleton or another line
+    1 batch none -o out                                    | none: no such file or folder
+    2 batch SCANS/ring.ply -o out --format stl             | unknown ending; known are .ply
+    2 batch SCANS/ring.ply -o out --format ,               | nothing to write
+    2 batch SCANS/ring.ply -o out --workers 2 --scheduler tcp://x:1 | give neither workers
 """
 
 
@@ -90,16 +105,32 @@ def files(tmp_path, y, ring_file):
     save_skeleton(skeleton, tmp_path / "rod.npz")
     np.savez(tmp_path / "none.npz", nodes=none, edges=np.empty((0, 2), int), radii=[])
     np.savetxt(tmp_path / "few.xyz", np.eye(3))
-    cube = o3d.geometry.TriangleMesh.create_box().translate((50, 0, 0))
-    o3d.io.write_triangle_mesh(str(tmp_path / "away.ply"), cube)
     texts = {"junk.ply": "hello", "nan.xyz": "0 0 0\n0 nan 1\n", "bad.json": "{}", "bad.swc": "1 2", "bad.docx": "x"}
+    texts |= {"none.xyz": "nan nan nan\n" * 20, "bad.mlx": SCRIPT.format("Generate Skeletn")}
+    texts |= {"points.mlx": SCRIPT.format("Generate Segmented Cloud (GLSkeleton)")}
+    (tmp_path / "folder.ply").mkdir()
     for name, text in texts.items():
         (tmp_path / name).write_text(text)
 
 
-@pytest.mark.usefixtures("files")
+@pytest.fixture
+def refuses(refused, files, scans):
+    """Run the command of a line; it must fail as the line says."""
+
+    def check(line):
+        words, message = map(str.strip, line.split("|"))
+        code, *words = words.replace("SCANS", str(scans)).split()
+        assert message in refused(int(code), *words)
+
+    return check
+
+
 @pytest.mark.parametrize("line", TABLE.strip().splitlines())
-def test_refusals(refused, scans, line):
-    words, message = map(str.strip, line.split("|"))
-    code, *words = words.replace("SCANS", str(scans)).split()
-    assert message in refused(int(code), *words)
+def test_refusals(refuses, line):
+    refuses(line)
+
+
+@pytest.mark.usefixtures("no_run")
+@pytest.mark.parametrize("line", BEFORE_ANY_RUN.strip().splitlines())
+def test_refusals_cost_no_run(refuses, line):
+    refuses(line)

@@ -45,21 +45,11 @@ def test_a_script_of_ours_is_the_pipeline(invoke, scans, script, tmp_path):
     connector = glsk_o3d.Connector(radius=0.02 * Layer.read(scan).diagonal)
     ahead, behind = glsk_o3d.pipelines.rings(), glsk_o3d.Refiner() | glsk_o3d.Tracer()
     expected = (ahead | contractor | connector | behind)(read_cloud(scan))
-    assert f", converged after {len(expected.report.iterations)} solves\n" in result.stdout
-    assert "iterations" not in result.stdout
+    assert f", iterations {len(expected.report.iterations)}, " in result.stdout
     back = read_skeleton(tmp_path / "s.json")
     np.testing.assert_array_equal(back.vertices, expected.vertices)
     assert back.report.stages == expected.report.stages
     np.testing.assert_array_equal(read_skeleton(tmp_path / "s.ply").edges, expected.edges)
-
-
-@pytest.mark.usefixtures("alone")
-@pytest.mark.parametrize("name", ["glskeleton", "cao2010"])
-def test_the_scripts_of_ours_by_name(invoke, scans, tmp_path, name):
-    assert invoke("run", name, scans / "sample.ply", "-o", "s.json", "-q").exit_code == 0
-    pipeline = "default" if name == "glskeleton" else name
-    expected = glsk_o3d.skeletonize(read_cloud(scans / "sample.ply"), pipeline)
-    np.testing.assert_array_equal(read_skeleton(tmp_path / "s.json").vertices, expected.vertices)
 
 
 def test_a_mixed_script_is_what_meshset_does(invoke, scans, tmp_path):
@@ -93,53 +83,27 @@ def test_the_cross_check_measures_and_writes_nothing(invoke, scans, tmp_path):
 
 @pytest.mark.usefixtures("alone")
 def test_points_are_written_with_labels_and_colours(invoke, scans, script, tmp_path):
-    outputs = [word for ending in ("ply", "pcd", "xyz") for word in ("-o", f"c.{ending}")]
+    outputs = [word for ending in ("ply", "xyz") for word in ("-o", f"c.{ending}")]
     result = invoke("run", script("Generate Segmented Cloud (GLSkeleton)"), scans / "sample.ply", *outputs, "-q")
     assert result.exit_code == 0, result.stderr
     points = np.asarray(read_cloud(scans / "sample.ply").points)
-    for name, rtol in (("c.ply", 1e-15), ("c.pcd", 1e-6), ("c.xyz", 1e-15)):
-        np.testing.assert_allclose(np.asarray(read_cloud(tmp_path / name).points), points, rtol=rtol)
+    for name in ("c.ply", "c.xyz"):
+        np.testing.assert_allclose(np.asarray(read_cloud(tmp_path / name).points), points, rtol=1e-15)
     cloud = o3d.t.io.read_point_cloud(str(tmp_path / "c.ply"))
     labels, colours = cloud.point.quality.numpy().ravel(), cloud.point.colors.numpy()
     assert len(np.unique(labels)) == len(np.unique(np.column_stack([labels, colours]), axis=0)) > 1
 
 
-@pytest.mark.usefixtures("no_run")
-@pytest.mark.parametrize(
-    ("code", "words", "message"),
-    [
-        (2, "run", "a SCRIPT and a SCAN are needed"),
-        (2, "run glskeleton SCAN", "nothing to write"),
-        (2, "run glskeletn SCAN -o s.ply", "no filter script is called 'glskeletn': did you mean"),
-        (1, "run none.mlx SCAN -o s.ply", "none.mlx: no such file"),
-        (1, "run bad.mlx SCAN -o s.ply", "bad.mlx, line 2: no filter is called 'Generate Skeletn'"),
-        (2, "run glskeleton SCAN -o s.stl", "s.stl: unknown ending; known are .ply"),
-        (2, "run points.mlx SCAN -o s.json", "s.json: unknown ending for points; known are .ply, .pcd"),
-        (2, "run glskeleton SCAN -o SCAN", "is an input"),
-        (1, "run glskeleton SCAN -o no/s.ply", "no: no such folder"),
-        (1, "run glskeleton nowhere.ply -o s.ply", "nowhere.ply: no such file"),
-        (1, "run glskeleton y.ply -o t.json", "the current layer (y.ply) is a skeleton or another line drawing"),
-    ],
-)
-def test_mistakes_cost_no_run(refused, scans, tmp_path, y, code, words, message):
-    (tmp_path / "bad.mlx").write_text('<FilterScript>\n<filter name="Generate Skeletn"/></FilterScript>')
-    (tmp_path / "points.mlx").write_text(OURS.format("Generate One Rings (GLSkeleton)", ""))
-    assert message in refused(code, *words.replace("SCAN", str(scans / "sample.ply")).split())
-
-
 def test_what_meshlab_cannot_do(refused, script, tmp_path, scans, y):
     pytest.importorskip("pymeshlab")
     (tmp_path / "torn.ply").write_bytes((scans / "sample.ply").read_bytes()[:2000])
-    (tmp_path / "odd.obj").write_text("nothing")
     wrong_layer = script("Hausdorff Distance", '<Param type="RichInt" name="SampledMesh" value="9"/>')
     for words, message in (
         ("scan_cleanup torn.ply -o c.ply", "torn.ply: not a valid .ply file: it promises 1100 points"),
-        ("scan_cleanup odd.obj -o c.ply", "odd.obj: "),
         ("scan_cleanup a.zzz -o c.ply", "a.zzz: "),
-        (f"scan_cleanup_then_skeleton {y} -o t.json", f"the current layer ({y}) is a skeleton or another line drawing"),
         (
             f"{wrong_layer} {scans}/sample.ply",
-            "s.mlx, line 2: filter 'Hausdorff Distance': sampledmesh = 9: there is no",
+            "s.mlx, line 2: filter 'Hausdorff Distance': sampledmesh = 9: ",
         ),
     ):
         assert message in refused(1, "run", *words.split())
@@ -149,58 +113,33 @@ def test_the_list_says_what_each_script_does(invoke):
     told = {each["name"]: each for each in json.loads(invoke("run", "--list", "--json").stdout)}
     assert set(told) == set(scripts()) >= {"glskeleton", "cao2010", "scan_cleanup", "scan_cleanup_then_skeleton"}
     assert all(len(each["doc"]) > 40 for each in told.values())
-    needing = {"mesh_crosscheck", "scan_cleanup", "scan_cleanup_then_skeleton"}
-    assert {name for name, each in told.items() if each["needs_pymeshlab"]} == needing
+    needing = [name for name, each in told.items() if each["needs_pymeshlab"]]
+    assert needing == ["mesh_crosscheck", "scan_cleanup", "scan_cleanup_then_skeleton"]
     lines = invoke("run", "--list").stdout.splitlines()
-    names = [line.split()[0] for line in lines if line and line[0] != " "]
-    marked = [lines[i - 1].split()[0] for i, line in enumerate(lines) if line.startswith("  needs pymeshlab")]
-    assert (names, set(marked)) == (list(told), needing)
-
-
-def _mesh(path):
-    mesh = o3d.geometry.TriangleMesh.create_torus(radial_resolution=40)
-    mesh.compute_vertex_normals()
-    assert o3d.io.write_triangle_mesh(str(path), mesh)
-    return len(mesh.vertices), len(mesh.triangles)
+    assert [lines[i - 1].split()[0] for i, line in enumerate(lines) if line.startswith("  needs pymeshlab")] == needing
 
 
 def test_measures_are_plain_and_a_mesh_can_be_written_as_points(invoke, script, tmp_path):
     pytest.importorskip("pymeshlab")
-    n_vertices, _ = _mesh(tmp_path / "m.ply")
+    mesh = o3d.geometry.TriangleMesh.create_torus(radial_resolution=40)
+    assert o3d.io.write_triangle_mesh(str(tmp_path / "m.ply"), mesh)
     name = script("Compute Geometric Measures")
     (step,) = json.loads(invoke("run", name, "m.ply", "--json").stdout)["steps"]
     assert np.shape(step["result"]["inertia_tensor"]) == (3, 3)
     assert step["result"]["bbox"]["max"] == pytest.approx([1.5, 1.5, 0.5])
-    said = invoke("run", name, "m.ply").stdout
-    assert said.count("\n") == 1
-    assert "bbox min -1.5 -1.5 -0.5, max 1.5 1.5 0.5, diagonal 4.3589, " in said
-    assert invoke("run", "scan_cleanup", "m.ply", "-o", "c.pcd", "-o", "c.xyz").exit_code == 0
-    for ending in ("pcd", "xyz"):
-        assert n_vertices / 2 < len(read_cloud(tmp_path / f"c.{ending}").points) <= n_vertices
-
-
-def test_one_file_that_cannot_be_written_does_not_cost_the_others(invoke, scans, tmp_path):
-    words = ("run", "glskeleton", scans / "ring.ply", "-o", "1.swc", "-o", "2.json")
-    result = invoke(*words)
-    assert result.exit_code == 1
-    assert result.stdout.endswith("\nwrote 2.json\n")
-    assert "glsk: error: 1.swc: this format holds trees only" in result.stderr
-    assert [path.name for path in tmp_path.iterdir()] == ["2.json"]
-    assert invoke(*words, "--cut-loops").exit_code == 0
-    cut, whole = read_skeleton(tmp_path / "1.swc"), read_skeleton(tmp_path / "2.json")
-    assert (cut.n_loops, whole.n_loops, len(whole.edges) - len(cut.edges)) == (0, 1, 1)
+    assert "bbox min -1.5 -1.5 -0.5, max 1.5 1.5 0.5, diagonal 4.3589, " in invoke("run", name, "m.ply").stdout
+    assert invoke("run", "scan_cleanup", "m.ply", "-o", "c.xyz").exit_code == 0
+    n_vertices = len(mesh.vertices)
+    assert n_vertices / 2 < len(read_cloud(tmp_path / "c.xyz").points) <= n_vertices
 
 
 @pytest.mark.usefixtures("alone")
-@pytest.mark.parametrize(
-    ("name", "parameter"),
-    [
-        ("Generate Curve Skeleton (GLSkeleton)", "sampler_drop_invalid"),
-        ("Generate Sampled Cloud (GLSkeleton)", "drop_invalid"),
-    ],
-)
-def test_points_that_are_not_finite(invoke, refused, scans, script, name, parameter):
+def test_points_that_are_not_finite_and_loops(invoke, refused, scans, script, tmp_path):
+    name, parameter = "Generate Curve Skeleton (GLSkeleton)", "sampler_drop_invalid"
     line = refused(1, "run", script(name), scans / "nan.ply", "-o", "s.ply")
-    assert f"the first at index 3: drop them with its parameter {parameter}, or remove them first" in line
+    assert f"the first at index 3: drop them with the parameter {parameter}, or remove them first" in line
     cured = script(name, f'<Param type="RichBool" name="{parameter}" value="true"/>')
     assert "NaN" not in invoke("run", cured, scans / "nan.ply", "-o", "s.ply").stderr
+    assert invoke("run", script(name), scans / "ring.ply", "-o", "1.swc").exit_code == 1
+    assert invoke("run", "glskeleton", scans / "ring.ply", "-o", "1.swc", "--cut-loops").exit_code == 0
+    assert read_skeleton(tmp_path / "1.swc").n_loops == 0

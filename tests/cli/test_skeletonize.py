@@ -9,53 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import glsk_o3d
 from glsk_o3d import annotate, read_skeleton, read_tensor_cloud, samples, to_tubes
 from glsk_o3d.cli.options import PipelineName
-from glsk_o3d.io.scans import read_mesh
+from glsk_o3d.io import streaming
+from glsk_o3d.io.scans import read_blocks, read_mesh
 from glsk_o3d.pipelines import PIPELINES
-
-
-@pytest.mark.usefixtures("no_run")
-@pytest.mark.parametrize(
-    ("code", "words", "message"),
-    [
-        (2, [], "nothing to write"),
-        (2, ["-o", "s.stl"], "s.stl: the file is a skeleton and its name ends in .ply or .obj"),
-        (2, ["-o", "s"], "s: the file is a skeleton"),
-        (2, ["-o", "s.ply", "--preview", "s.jpg"], "s.jpg: the picture is a PNG and its name ends in .png"),
-        (2, ["--report", "s.pdf"], "s.pdf: the report is a page and its name ends in .html"),
-        (2, ["--tubes", "s.xyz"], "s.xyz: the tubes are a mesh and its name ends in .ply or .obj"),
-        (2, ["--labelled", "s.npz"], "s.npz: the cloud with labels is PLY and its name ends in .ply"),
-        (2, ["--save-recipe", "a.yaml", "-o", "a.ply"], "a.yaml: the file is a recipe and its name ends in .json"),
-        (2, ["-o", "s.ply", "-o", "./s.ply"], "s.ply: is named twice"),
-        (2, ["-o", "SCAN"], "is an input"),
-        (1, ["-o", "no/where/s.ply"], "no/where: no such folder"),
-        (1, ["-o", "/proc/s.ply"], "/proc/s.ply: no file can be made in this folder"),
-        (1, ["-o", "folder.ply"], "folder.ply: is a folder or a device, not a file to write to"),
-        (2, ["-o", "s.ply", "--pipeline", "wen2042"], "no pipeline is called 'wen2042': did you mean 'wen2024'?"),
-        (2, ["-o", "s.ply", "--set", "Connector.radius=-1"], "Connector.radius = -1.0: must be above 0"),
-        (2, ["-o", "s.ply", "--stream", "--pipeline", "wen2024"], "this pipeline takes all points of a cloud"),
-    ],
-)
-def test_typos_cost_no_run(refused, scans, tmp_path, code, words, message):
-    (tmp_path / "folder.ply").mkdir()
-    scan = str(scans / "sample.ply")
-    assert message in refused(code, "skeletonize", scan, *(scan if word == "SCAN" else word for word in words))
-
-
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("none.ply", "none.ply: no such file"),
-        ("empty.ply", "empty.ply: the file is empty"),
-        (".", "folder"),
-        ("nan.ply", "nan.ply: 2 of 1000 points have NaN"),
-        ("none.xyz", "none.xyz: none of its 20 points has finite coordinates: there is no cloud to work with"),
-    ],
-)
-def test_scans_that_cannot_be_used(refused, scans, tmp_path, name, message):
-    (tmp_path / "none.xyz").write_text("nan nan nan\n" * 20)
-    assert message in refused(1, "skeletonize", name if name == "none.xyz" else scans / name, "-o", "s.ply")
 
 
 def test_points_that_are_dropped(invoke, scans, tmp_path):
@@ -93,13 +52,12 @@ def test_a_report(invoke, write_scan, tmp_path):
 
 
 def test_settings_reach_the_run_and_how_it_ended_is_a_line(invoke, scans, tmp_path):
-    settings = ("Contractor.stop=RingSizeRatio", "RingSizeRatio.threshold=0.2", "Connector.radius=5%")
-    words = [word for setting in (*settings, "Contractor.max_iterations=1") for word in ("--set", setting)]
-    result = invoke("skeletonize", scans / "sample.ply", "-o", "s.json", *words)
+    settings = ("--set", "stop=RingSizeRatio", "--set", "Connector.radius=5%", "--set", "max_iterations=1")
+    result = invoke("skeletonize", scans / "sample.ply", "-o", "s.json", *settings)
     assert "contraction  not converged after 1 solve: reached max_iterations = 1\n" in result.stdout
     assert not re.search(r"^(iterations|stop reason|converged|sampled) ", result.stdout, re.MULTILINE)
     stages = read_skeleton(tmp_path / "s.json").report.stages
-    assert any("stop=RingSizeRatio(threshold=0.2)" in stage for stage in stages)
+    assert any("stop=RingSizeRatio(" in stage for stage in stages)
     assert any("Connector(radius='5%'" in stage for stage in stages)
 
 
@@ -111,14 +69,15 @@ def test_every_named_pipeline(invoke, scans, tmp_path, name):
     assert set(report.stages) >= {repr(stage) for stage in PIPELINES[name]().stages}
 
 
-def test_a_root_makes_one_tree(invoke, scans, tmp_path):
-    result = invoke("skeletonize", scans / "ring.ply", "-o", "r.json", "--root", "-x")
-    assert result.exit_code == 0, result.stderr
+@pytest.mark.parametrize("pipeline", ["default", "wen2024"])
+def test_a_root_makes_a_tree_of_any_pipeline(invoke, scans, tmp_path, pipeline):
+    words = ("skeletonize", scans / "ring.ply", "-o", "r.json", "--pipeline", pipeline, "--root")
+    assert invoke(*words, "-x").exit_code == 0
     tree = read_skeleton(tmp_path / "r.json")
     assert (tree.n_loops, tree.n_components) == (0, 1)
     assert tree.vertices[0].tolist() == list(tree.report.root)
     assert tree.vertices[0, 0] == tree.vertices[:, 0].max()
-    assert tree.report.recipe["pipeline"][-1]["root"] == "-x"
+    assert invoke(*words, "up").exit_code == 2
 
 
 def test_warnings_json_and_quiet(invoke, scans, tmp_path):
@@ -144,8 +103,6 @@ def test_verbose_shows_each_iteration_the_log_and_where_an_error_comes_from(invo
     result = invoke("skeletonize", scans / "sample.ply", "-o", "s.ply", "--verbose")
     assert "glsk: Connector took" in result.stderr
     assert "glsk: solve 1: 1100 points" in result.stderr
-    assert "w_L" in result.stderr
-    assert "merged" not in result.stdout
     result = invoke("skeletonize", scans / "nan.ply", "-o", "s.ply", "--verbose")
     assert result.exit_code == 1
     assert "Traceback" in result.stderr
@@ -208,38 +165,10 @@ def test_tubes_are_those_of_the_skeleton(invoke, las, tmp_path):
     assert tubes.has_vertex_colors()
 
 
-def save_cloud(path, points, **attributes):
-    import open3d as o3d
-
-    from glsk_o3d import save_tensor_cloud
-
-    cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(points))
-    for name, values in attributes.items():
-        cloud.point[name] = o3d.core.Tensor(values)
-    save_tensor_cloud(cloud, path)
-
-
-def test_labels_do_not_change_the_skeleton(invoke, tmp_path):
-    points, counts = samples.torus(1000).points, (1 + np.arange(1000) % 7)[:, None].astype(np.int32)
-    points[[3, 8], 0] = np.nan
-    save_cloud(tmp_path / "scan.ply", points, sample_count=counts)
-    words = ("skeletonize", tmp_path / "scan.ply", "--drop-invalid")
-    assert invoke(*words, "-o", "a.json").exit_code == 0
-    assert invoke(*words, "-o", "b.json", "--labelled", "l.ply").exit_code == 0
-    a, b = read_skeleton("a.json"), read_skeleton("b.json")
-    np.testing.assert_array_equal(a.vertices, b.vertices)
-    labels = read_tensor_cloud("l.ply").point
-    np.testing.assert_array_equal(labels.sample_count.numpy(), counts)
-    np.testing.assert_array_equal(labels.skeleton_vertex.numpy()[:, 0], a.vertex_of_point)
-    assert np.flatnonzero(labels.branch.numpy() < 0).tolist() == [3, 8]
-
-
-def test_a_large_scan_is_read_in_blocks(invoke, tmp_path, monkeypatch):
-    from glsk_o3d.io import scans, streaming
-
+def test_a_large_scan_is_read_in_blocks(invoke, tmp_path, write_scan, monkeypatch):
     scan, n = tmp_path / "scan.ply", 9000
-    save_cloud(scan, samples.torus(n).points)
-    monkeypatch.setitem(scans.read_blocks.__kwdefaults__, "rows", 2000)
+    write_scan(scan, samples.torus(n).points)
+    monkeypatch.setitem(read_blocks.__kwdefaults__, "rows", 2000)
     words = ("skeletonize", scan, "-o", "s.json", "--set", "size=4000", "--set", "thin_to=2000")
     assert invoke(*words).stderr == ""
     whole = read_skeleton("s.json")
@@ -248,26 +177,16 @@ def test_a_large_scan_is_read_in_blocks(invoke, tmp_path, monkeypatch):
     assert result.exit_code == 0, result.output
     facts = json.loads(result.stdout)
     assert (facts["points"], facts["loops"]) == (n, 1)
-    assert f"read in blocks: the skeleton is that of a sample of {facts['sampled']} of {n} points" in result.stderr
+    assert 0 < facts["sampled"] < n
     np.testing.assert_allclose(read_skeleton("s.json").vertices, whole.vertices, atol=1e-9)
     assert len(read_tensor_cloud("l.ply").point.branch) == n
-    again = invoke("rerun", "s.json", "--json")
-    assert (
-        "it holds a sample of a large cloud without the number of points that each represents: give the scan"
-        in again.stderr
-    )
-    assert json.loads(invoke("rerun", "s.json", scan, "--json").stdout)["identical"]
-    assert invoke(*words, "--no-stream").stderr == ""
-    few = invoke(*words, "--stream", "--where", "x > 0.35")
-    assert re.search(r"scan\.ply: read in blocks: all \d+ points are taken\n", few.stderr)
+    assert json.loads(invoke(*words, "--no-stream", "--json").stdout)["points"] == n
 
 
 # -------------------------------------------------------------------------------------------------- doubts about a run
 
 
 def test_a_close_call_comes_with_the_option_that_answers_otherwise(invoke, scans, monkeypatch):
-    import glsk_o3d
-
     call = glsk_o3d.Decision("gap", (1.0, 2.0, 3.0), 0.42, changed=False)
     real = glsk_o3d.Refiner._run
 
@@ -290,13 +209,3 @@ def test_support_is_told_and_shown(invoke, scans, tmp_path):
     told = json.loads(invoke("skeletonize", scans / "ring.ply", "-o", "s.json", "--support", "2", "--json").stdout)
     assert (told["samples"], told["agreeing"], told["unsupported"]) == (2, 2, [])
     assert invoke("skeletonize", scans / "ring.ply", "-o", "u.json", "--support", "1").exit_code == 2
-
-
-@pytest.mark.parametrize("pipeline", ["default", "wen2024"])
-def test_a_root_makes_a_tree_of_any_pipeline(invoke, scans, pipeline):
-    scan = scans / "ring.ply"
-    assert invoke("skeletonize", scan, "-o", "t.json", "--pipeline", pipeline, "--root", "z", "-q").exit_code == 0
-    tree = read_skeleton("t.json")
-    assert (tree.n_components, tree.n_loops) == (1, 0)
-    assert tree.vertices[0, 2] <= tree.vertices[:, 2].min() + 1e-9
-    assert invoke("skeletonize", scan, "-o", "u.json", "--root", "up").exit_code == 2

@@ -4,7 +4,6 @@ import json
 from dataclasses import replace
 
 import numpy as np
-import open3d as o3d
 import pytest
 from scipy.spatial.transform import Rotation
 
@@ -16,15 +15,14 @@ from glsk_o3d import (
     Refiner,
     RingBuilder,
     Sampler,
-    read_cloud,
     samples,
     skeletonize,
 )
 from glsk_o3d.crosscheck import cross_check
 from glsk_o3d.crosscheck.agreement import compare_rows, compare_skeletons, mesh_fit
-from glsk_o3d.crosscheck.mesh import spacing
+from glsk_o3d.crosscheck.mesh import ball_pivoting, spacing
+from glsk_o3d.crosscheck.mesh_rings import border_lengths
 from glsk_o3d.errors import InvalidCloudError, InvalidParameterError, SkeletonWarning
-from glsk_o3d.numerics.mesh_rings import border_lengths
 
 SPIKY = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
 
@@ -37,8 +35,6 @@ def test_clean_and_dense_shapes_agree(shape):
     assert found.rows.covered > 0.8
     assert found.rows.same_rings > 0.5
     assert found.rows.angle["median"] < 0.1
-    assert found.rows.length["median"] == pytest.approx(1, abs=0.01)
-    assert found.skeletons.topology
     assert found.skeletons.distance_in_radii < 0.05
 
 
@@ -46,7 +42,6 @@ def test_noise_turns_the_rows_before_it_moves_the_skeleton():
     found = cross_check(samples.torus(2048, noise=0.0025).points)
     assert (found.verdict, found.surface) == ("agrees in part", "poisson")
     assert found.rows.angle["median"] > 15
-    assert found.skeletons.topology
     assert found.skeletons.distance_in_radii < 0.1
     assert len(found.reasons) == 1
     assert "a quarter of the Laplacian coordinates" in found.reasons[0]
@@ -74,20 +69,6 @@ def test_it_tells_where_the_cloud_is_noisy():
 )
 def test_too_sparse_too_noisy_or_without_a_curve(verdict, shape, n, noise):
     assert cross_check(samples.SAMPLES[shape](n, noise=noise).points).verdict == verdict
-
-
-def test_even_points_agree_to_rounding(even_ball):
-    points, faces = even_ball(600)
-    with pytest.warns(SkeletonWarning):
-        found = cross_check(points, (points, faces))
-    assert found.surface == "given"
-    assert found.rows.compared == found.rows.closed == 600
-    assert found.rows.same_rings > 0.95
-    same = found.ring_share == 1
-    assert found.angle[same].max() < 1e-4
-    np.testing.assert_allclose(found.length_ratio[same], 1, rtol=1e-9)
-    assert found.verdict != "agrees"  # a ball: the run itself warns
-    assert any("itself warns" in reason for reason in found.reasons)
 
 
 def test_the_fit_of_meshes_that_are_known(ring, check):
@@ -123,12 +104,10 @@ def test_flat_rows_have_one_direction(grid):
     points = np.column_stack([x, y, 0.4 * x])
     state = RingBuilder()(points)
     faces = np.lexsort(state.points[state.point_of_survivor].T[1::-1])[grid(12, 12, 0, 0)]
-    (angle, length, _), found = compare_rows(state, state.cloud, faces)
+    angle, found = compare_rows(state, state.cloud, faces)
     compared = np.isfinite(angle)
     assert compared.sum() == found.compared > 50
-    assert found.flat > 0.9
-    assert (angle[compared] == 0).mean() >= found.flat
-    assert (length[compared] == 1).mean() >= found.flat
+    assert (angle[compared] == 0).mean() > 0.9
 
 
 def test_the_unsupported_end_of_either_skeleton_counts(make):
@@ -137,10 +116,9 @@ def test_the_unsupported_end_of_either_skeleton_counts(make):
         return replace(line, radii=np.full(50, 0.5))
 
     for ours, theirs in ((1, 3), (3, 1)):
-        found = compare_skeletons(path(ours), path(theirs), 3.0)
+        found = compare_skeletons(path(ours), path(theirs), 0.006)
         # of 3 units the last 2 are up to 2 from the other, whose radius is the same
         assert found.hausdorff95_in_radii == pytest.approx(1.85 / 0.5, rel=0.01)
-        assert found.hausdorff95 == pytest.approx(1.85 / 3, rel=0.01)
 
 
 def test_numbers_of_points_fit_the_numbers_of_all(ring, check):
@@ -149,13 +127,10 @@ def test_numbers_of_points_fit_the_numbers_of_all(ring, check):
     compared = np.isfinite(check.angle)
     assert check.rows.compared == compared.sum()
     assert check.rows.covered == compared.sum() / check.rows.closed
-    assert check.rows.same_rings == (check.ring_share[compared] == 1).mean()
-    assert (check.ring_share[check.angle > 1e-3] < 1).all()
     assert (check.doubtful == (~compared | (check.angle > 30))).all()
     told = json.loads(json.dumps(check.to_dict(), allow_nan=False))
     assert (told["verdict"], told["skeletons"]["loops"], told["rows"]["one_to_one"]) == ("agrees", [1, 1], True)
     assert told["points"]["not_compared"] == (~compared).sum()
-    assert "2 igl.cotmatrix" in told["convention"]
 
 
 def test_units_place_turn_and_order_do_not_matter(ring, check):
@@ -166,7 +141,7 @@ def test_units_place_turn_and_order_do_not_matter(ring, check):
     # ties in Morton order and in the balls' way may fall differently, so not to the last digit
     assert moved.rows.covered == pytest.approx(check.rows.covered, abs=0.03)
     assert moved.rows.same_rings == pytest.approx(check.rows.same_rings, abs=0.05)
-    assert moved.skeletons.distance == pytest.approx(check.skeletons.distance, abs=1e-3)
+    assert moved.skeletons.distance_in_radii == pytest.approx(check.skeletons.distance_in_radii, abs=0.01)
     scaled = cross_check(8.0 * ring.points)
     np.testing.assert_allclose(scaled.angle, check.angle, atol=1e-4)
     assert scaled.skeletons.distance_in_radii == pytest.approx(check.skeletons.distance_in_radii, rel=1e-6)
@@ -187,51 +162,34 @@ def test_another_pipeline(ring):
 # ---------------------------------------------------------------------------------------------------------- the meshes
 
 
-@pytest.fixture(scope="module")
-def surface(check):
-    """The reconstructed mesh as a user's, with its vertices in another order."""
-    order = np.random.default_rng(1).permutation(len(check.vertices))
-    return check.vertices[order], np.argsort(order)[check.faces]
-
-
-def test_a_mesh_of_the_clouds_own_points(ring, check, surface):
-    mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(surface[0]), o3d.utility.Vector3iVector(surface[1]))
-    for given in (surface, mesh):
-        found = cross_check(ring.points, given)
-        assert found.surface == "given"
-        assert found.rows == check.rows
-        assert found.skeletons.distance == pytest.approx(check.skeletons.distance, rel=1e-3)
-
-
-def test_a_mesh_of_other_points(ring, grid):
-    # a fine regular mesh of the same torus: curvature normals are compared, interpolated
+def test_rows_of_a_mesh_of_other_points(ring, grid):
+    """A fine regular mesh of the same torus: curvature normals are compared, interpolated."""
     radius, width = np.linalg.norm(ring.nodes[0]), ring.radii[0]
     u, v = (each.ravel() * 2 * np.pi / m for each, m in zip(np.mgrid[:160, :40], (160, 40), strict=True))
     out = radius + width * np.cos(v)
-    vertices, faces = np.stack([out * np.cos(u), out * np.sin(u), width * np.sin(v)], axis=1), grid(160, 40, 1, 1)
-    found = cross_check(ring.points, (vertices, faces))
-    assert not found.rows.one_to_one
-    assert found.rows.same_rings is found.rows.common_triangles is None
-    assert np.isnan(found.ring_share).all()
-    assert found.rows.covered == 1
-    assert found.rows.angle["median"] < 5
-    assert 0.7 < found.rows.length["median"] < 1.6
-    assert found.verdict == "agrees"
+    state = RingBuilder()(ring.points)
+    vertices = state.frame.into(np.stack([out * np.cos(u), out * np.sin(u), width * np.sin(v)], axis=1))
+    angle, found = compare_rows(state, vertices, grid(160, 40, 1, 1))
+    assert (found.one_to_one, found.same_rings, found.covered) == (False, None, 1)
+    assert found.angle["median"] == pytest.approx(np.nanmedian(angle))
+    assert found.angle["median"] < 5
 
 
-def test_holes_extra_triangles_and_bare_vertices(ring, check):
-    # a mesh with a fin, a triangle given twice, and a hole, some vertices of which have no triangle left
-    hole = check.vertices[:, 0] > 0.3
-    faces = check.faces[~hole[check.faces].any(axis=1)]
+def test_rows_beside_a_hole_and_a_fin_are_not_compared(ring):
+    state = RingBuilder()(ring.points)
+    vertices, whole = ball_pivoting(state)
+    hole = vertices[:, 0] > 0.6 * vertices[:, 0].max()
+    faces = whole[~hole[whole].any(axis=1)]
     i, j = faces[0, :2]
     fin = [i, j, np.flatnonzero(~hole & ~np.isin(np.arange(len(hole)), faces[:50]))[0]]
-    found = cross_check(ring.points, (check.vertices, np.vstack([faces, faces[:1, ::-1], [fin]])))
-    assert found.rows.one_to_one
-    missing = ring.points[:, 0] > 0.3
-    assert np.isnan(found.angle[missing]).all()
-    assert np.isnan(found.angle).sum() < np.isnan(check.angle).sum() + 1.5 * missing.sum() + 20
-    assert found.skeletons.loops[0] == 1
-    assert found.verdict == "cannot tell"  # the mesh's ring is broken
+    before, _ = compare_rows(state, vertices, whole)
+    angle, found = compare_rows(state, vertices, np.vstack([faces, [fin]]))
+    assert found.one_to_one
+    assert np.isnan(angle[hole]).all()
+    assert np.isnan(angle[fin]).all()
+    assert np.isnan(angle).sum() < np.isnan(before).sum() + 1.5 * hole.sum() + 20
+    kept = np.isfinite(angle)
+    np.testing.assert_allclose(angle[kept], before[kept], atol=1e-6)
 
 
 def test_poisson_and_a_single_method(ring):
@@ -242,23 +200,9 @@ def test_poisson_and_a_single_method(ring):
     assert noisy.rows.covered < 0.7
 
 
-@pytest.mark.parametrize(
-    ("mesh", "message"),
-    [
-        ("alpha", "mesh = 'alpha': must be 'auto', 'ball_pivoting', 'poisson', or a mesh"),
-        ((np.eye(3), [[0.0, 1, 2]]), "names a missing vertex"),
-        (o3d.geometry.TriangleMesh(), "needs"),
-        ((np.zeros((3, 3)), [[0, 1, 2]]), "no triangle of the mesh has an area"),
-    ],
-)
-def test_useless_meshes(ring, mesh, message):
-    with pytest.raises(InvalidParameterError, match=message):
-        cross_check(ring.points, mesh)
-
-
-def test_a_mesh_that_lies_elsewhere(ring):
-    with pytest.raises(InvalidCloudError, match="same units and place"):
-        cross_check(ring.points, (np.eye(3) + 100, [[0, 1, 2]]))
+def test_an_unknown_method(ring):
+    with pytest.raises(InvalidParameterError, match="method = 'alpha': must be 'auto' or 'ball_pivoting' or 'poisson'"):
+        cross_check(ring.points, "alpha")
 
 
 # ---------------------------------------------------------------------------------------------------------- the clouds
@@ -268,7 +212,7 @@ def test_large_clouds_are_thinned_and_the_user_is_told(ring):
     with pytest.warns(SkeletonWarning, match="1000 of 1500 points .*max_points") as caught:
         found = cross_check(ring.points, max_points=1000)
     assert caught[0].filename == __file__
-    assert (found.n_input, len(found.points), found.rows.rows) == (1500, 1000, 1000)
+    assert (found.n_input, len(found.points)) == (1500, 1000)
     assert len(np.unique(found.points, axis=0)) == 1000
     assert {tuple(point) for point in found.points} <= {tuple(point) for point in ring.points}
     assert found.skeletons.loops == (1, 1)
@@ -301,14 +245,13 @@ def test_where_poisson_fails_the_balls_surface_is_better_than_none():
     assert found.surface == "ball_pivoting"
     assert found.rows.compared > 200
     assert found.skeletons.components == (2, 2)
-    with pytest.raises(InvalidCloudError, match="1000 points by poisson"):
+    with pytest.raises(InvalidCloudError, match="1000 points: poisson"):
         cross_check(far, "poisson")
 
 
 def test_duplicates_share_their_row(ring, check):
     found = cross_check(np.vstack([ring.points, ring.points[:10]]))
     np.testing.assert_array_equal(found.angle[1500:], found.angle[:10])
-    assert found.rows.rows == 1500
 
 
 @SPIKY
@@ -332,8 +275,3 @@ def test_clouds_without_a_surface():
 def test_useless_pipelines(ring, pipeline):
     with pytest.raises(InvalidParameterError, match=r"pipeline|lead from a cloud"):
         cross_check(ring.points, pipeline=pipeline)
-
-
-def test_a_real_scan(shared_dir):
-    found = cross_check(read_cloud(shared_dir / "data" / "simplejoint.ply"))
-    assert (found.verdict, found.skeletons.loops) == ("agrees", (0, 0))

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import igl
 import numpy as np
-import open3d as o3d
 import pytest
 from scipy.spatial import ConvexHull, cKDTree
 
@@ -14,19 +13,19 @@ from glsk_o3d.crosscheck.mesh import (
     ball_pivoting,
     curvature_normals,
     mesh_areas,
-    mesh_arrays,
     mesh_laplacian,
     mesh_skeleton,
     mesh_state,
+    orient_normals,
     poisson,
     ring_areas,
     spacing,
 )
-from glsk_o3d.errors import InvalidParameterError
+from glsk_o3d.crosscheck.mesh_rings import common_share, umbrellas
 from glsk_o3d.numerics.cotangent import WEIGHT_CAP, cotangent_laplacian
-from glsk_o3d.numerics.mesh_rings import common_share, umbrellas
+from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
 from glsk_o3d.numerics.rings import Rings
-from glsk_o3d.samples import sheet, torus, tube
+from glsk_o3d.samples import sheet, sphere, torus, tube, two_rings
 
 
 def convex_rings(points, faces):
@@ -233,16 +232,15 @@ def test_the_skeleton_of_a_torus_is_its_axis():
     assert np.abs(skeleton.vertices[:, 2]).max() < 0.01
 
 
-def test_every_kind_of_mesh_gives_the_same_arrays_and_what_is_useless_none():
-    octahedron = o3d.geometry.TriangleMesh.create_octahedron()
-    vertices, faces = np.asarray(octahedron.vertices), np.asarray(octahedron.triangles)
-    for mesh in (octahedron, o3d.t.geometry.TriangleMesh.from_legacy(octahedron), (vertices, faces)):
-        found = mesh_arrays(mesh)
-        assert [array.dtype for array in found] == [np.float64, np.int64]
-        np.testing.assert_array_equal(found[0], vertices)
-        np.testing.assert_array_equal(found[1], faces)
-        assert not np.shares_memory(found[0], vertices)
-    bare, lost = (np.eye(3), np.zeros((0, 3), int)), (np.eye(3) * np.nan, [[0, 1, 2]])
-    for wrong, says in ((7, "int"), (bare, r"\(F, 3\)"), ((np.eye(3), [[0, 1, 3]]), "vertex"), (lost, "not finite")):
-        with pytest.raises(InvalidParameterError, match=says):
-            mesh_arrays(wrong)
+# ------------------------------------------------------------------------------------------------------ orientation
+
+
+@pytest.mark.parametrize("shape", [sphere, torus, two_rings])
+def test_normals_of_closed_surfaces_point_outward(shape):
+    sample = shape(3000)
+    outward = sample.points - sample.nodes[cKDTree(sample.nodes).query(sample.points)[1]]
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    mixed = outward * np.random.default_rng(0).choice([-1, 1], (len(outward), 1))
+    neighbours = nearest_neighbours(sample.points, 8)[1]
+    edges = np.column_stack([np.repeat(np.arange(3000), 7), neighbours[:, 1:].ravel()])
+    np.testing.assert_array_equal(orient_normals(sample.points, mixed, edges), outward)

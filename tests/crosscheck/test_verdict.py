@@ -23,19 +23,17 @@ def judged(rows, skeletons, warned=(), mesh_report=SETTLED, fit=FIT):
 
 
 def rows(**changed):
-    good = RowAgreement(100, 90, 90, 1.0, True, 0.9, 0.95, 0.0, {"median": 1.0, "p75": 2.0}, {"median": 1.0})
-    return replace(good, **changed)
+    return replace(RowAgreement(90, 90, 1.0, True, 0.9, {"median": 1.0, "p75": 2.0}), **changed)
 
 
 def apart(**changed):
-    return replace(SkeletonAgreement(0.01, 0.05, 0.02, 0.1, (1, 1), (2, 2), (3, 3)), **changed)
+    return replace(SkeletonAgreement(0.05, 0.1, (1, 1), (2, 2)), **changed)
 
 
 @pytest.mark.parametrize(
     ("verdict", "of_rows", "of_skeletons", "reason"),
     [
         ("agrees", {}, {}, None),
-        ("agrees", {}, {"leaves": (3, 4)}, None),
         ("agrees in part", {"angle": {"median": 1.0, "p75": 31.0}}, {}, "turned by more than 31 degrees"),
         ("agrees in part", {"covered": 0.69}, {}, "closes around 69%"),
         ("cannot tell", {"compared": 0, "covered": 0.0, "angle": {}}, {}, "no Laplacian coordinates"),
@@ -53,20 +51,6 @@ def test_thresholds(verdict, of_rows, of_skeletons, reason):
     found, reasons = judged(rows(**of_rows), apart(**of_skeletons))
     assert found == verdict
     assert [reason in text for text in reasons] == ([] if reason is None else [True])
-
-
-SHAPE = "the rings agree: it is the shape, not the sampling; in a blob a curve may run anywhere"
-
-
-@pytest.mark.parametrize("changed", [{"distance_in_radii": 0.6}, {"hausdorff95_in_radii": 1.2}])
-def test_where_the_rings_agree_it_is_the_shape(changed):
-    whole = {"rows": 100, "closed": 99, "compared": 99}
-    assert SHAPE in judged(rows(**whole), apart(**changed))[1]
-    assert SHAPE not in judged(rows(**whole), apart())[1]
-    for of_rows in ({"closed": 98}, {"angle": {"p75": 31.0}}, {"covered": 0.6}, {"one_to_one": False}):
-        assert SHAPE not in judged(rows(**whole | of_rows), apart(**changed))[1]
-    assert SHAPE not in judged(rows(**whole), apart(**changed, loops=(1, 2)))[1]
-    assert SHAPE not in judged(rows(**whole), apart(**changed), (), FAILED)[1]
 
 
 def test_a_mesh_that_fails_is_named():

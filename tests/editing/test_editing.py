@@ -7,7 +7,7 @@ import pytest
 
 from glsk_o3d import InvalidParameterError, Skeleton, pipelines, samples, skeletonize
 from glsk_o3d.analysis import branch_table
-from glsk_o3d.editing import cut_loops, largest_component, prune, reroot, simplify, smooth
+from glsk_o3d.editing import cut_loops, largest_component, prune, reroot, simplify
 
 
 @pytest.fixture(scope="module")
@@ -57,11 +57,6 @@ def test_of_a_fork_the_shorter_prong_goes():
     np.testing.assert_array_equal(prune(fork, length=5).vertices, fork.vertices[[0, 1, 3]])
 
 
-@pytest.mark.parametrize(("radius", "leaves"), [(0.05, 5), (0.15, 4), (0.35, 2)])
-def test_thin_branches_go(radius, leaves):
-    assert len(prune(comb(), radius=radius).leaves) == leaves
-
-
 def test_orders(grown):
     stem, table = prune(grown, order=0), branch_table(grown)
     assert len(stem.leaves) == 2
@@ -74,11 +69,9 @@ def test_orders(grown):
 
 
 def test_what_cannot_be_pruned(ring):
-    assert prune(ring, length=99, radius=99) is ring
+    assert prune(ring, length=99) is ring
     with pytest.raises(InvalidParameterError, match="loops"):
         prune(ring, order=0)
-    with pytest.raises(InvalidParameterError, match="radii"):
-        prune(replace(comb(), radii=np.full(14, np.nan)), radius=1)
 
 
 # ------------------------------------------------------------------------------------------------------------ simplify
@@ -105,42 +98,12 @@ def test_no_vertex_was_farther_away(grown, tolerance):
     same_points(grown, left)
 
 
-def test_so_many_vertices(grown):
-    left = simplify(grown, n=40)
-    assert (len(left.vertices), left.n_components, left.n_loops) == (40, 1, 0)
-    assert len(left.leaves) == len(grown.leaves)
-
-
 def test_loops_stay_and_a_ring_is_at_least_a_triangle(ring):
-    for options in (dict(tolerance=99), dict(n=1)):
-        left = simplify(ring, **options)
-        assert (left.n_loops, len(left.vertices)) == (1, 3)
+    left = simplify(ring, tolerance=99)
+    assert (left.n_loops, len(left.vertices)) == (1, 3)
     places = [(0, 0, 0), (1, 0, 0), (2, 0, 0), (1, 1, 0), (1, -1, 0), (3, 0, 0), (4, 0, 0)]
     theta = graph(places, [(0, 1), (1, 2), (0, 3), (3, 2), (0, 4), (4, 2), (2, 5), (5, 6)])
     assert simplify(theta, tolerance=99).n_loops == theta.n_loops == 2
-
-
-# -------------------------------------------------------------------------------------------------------------- smooth
-
-
-def test_noise_goes_and_the_size_stays():
-    turn = np.linspace(0, 2 * np.pi, 200, endpoint=False)
-    circle = np.column_stack([np.cos(turn), np.sin(turn), 0 * turn])
-    rough = circle + np.random.default_rng(0).normal(scale=0.02, size=circle.shape)
-    before = graph(rough, [*((i, i + 1) for i in range(199)), (0, 199)])
-    np.testing.assert_array_equal(smooth(before, passes=0).vertices, rough)
-    after = np.linalg.norm(smooth(before, passes=20).vertices, axis=1)
-    assert np.abs(after - 1).mean() < 0.5 * np.abs(np.linalg.norm(rough, axis=1) - 1).mean()
-    assert after.mean() == pytest.approx(1, abs=0.003)
-
-
-def test_ends_and_junctions_are_not_smoothed(grown):
-    left = smooth(grown, passes=5)
-    kept = grown.degree != 2
-    np.testing.assert_array_equal(left.vertices[kept], grown.vertices[kept])
-    assert (left.vertices[~kept] != grown.vertices[~kept]).any()
-    np.testing.assert_array_equal(left.edges, grown.edges)
-    np.testing.assert_array_equal(left.confidence, grown.confidence)
 
 
 # -------------------------------------------------------------------------------------------------------------- graphs
@@ -197,9 +160,8 @@ def test_what_has_no_root(ring):
 @pytest.mark.parametrize(
     ("edit", "wrong"),
     [
-        *((prune, wrong) for wrong in (dict(length=-1), dict(length=np.nan), dict(radius=np.inf), dict(order=1.5))),
-        *((simplify, wrong) for wrong in ({}, dict(tolerance=1, n=3), dict(tolerance=-1), dict(n=0))),
-        *((smooth, dict(passes=wrong)) for wrong in (-1, 1.5, True)),
+        *((prune, wrong) for wrong in (dict(length=-1), dict(length=np.nan), dict(order=1.5))),
+        (simplify, dict(tolerance=-1)),
         *((reroot, dict(root=wrong)) for wrong in ("w", 9999, -1, (1, 2), "1,2", (np.nan, 0, 0), True, [[]])),
     ],
 )
@@ -216,7 +178,6 @@ def test_refuses(edit, wrong):
         lambda it: reroot(it, "x"),
         largest_component,
         lambda it: cut_loops(it)[0],
-        lambda it: smooth(it, passes=0),
     ],
 )
 def test_half_axes_stay_with_their_vertices(grown, edit):
@@ -228,7 +189,7 @@ def test_half_axes_stay_with_their_vertices(grown, edit):
     np.testing.assert_array_equal(left.half_thickness, left.vertices[:, 1] + 2)
 
 
-@pytest.mark.parametrize("edit", [largest_component, lambda it: simplify(it, n=3), smooth, lambda it: cut_loops(it)[0]])
+@pytest.mark.parametrize("edit", [largest_component, simplify, lambda it: cut_loops(it)[0]])
 def test_a_cloud_without_vertices_stays_one(edit):
     cloud = Skeleton((), (), (), (), np.eye(3), ())
     assert edit(cloud).vertex_of_point.tolist() == [-1] * 3

@@ -57,14 +57,15 @@ def test_until_a_file_is_complete_the_old_one_is_there(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["s.json"]
 
 
-@pytest.mark.parametrize("path", ["missing/s.json", "s.json"])
-def test_json_that_cannot_be_written_leaves_nothing(tmp_path, path):
-    with pytest.raises((FileNotFoundError, ValueError)):
-        write_json(tmp_path / path, {"x": float("nan")})
+def test_json_that_cannot_be_written_leaves_nothing(tmp_path):
+    with pytest.raises(FileNotFoundError, match="no such folder"):
+        write_json(tmp_path / "missing" / "s.json", {})
+    with pytest.raises(ValueError):
+        write_json(tmp_path / "s.json", {"x": float("nan")})
     assert not list(tmp_path.iterdir())
 
 
 def test_endings_of_files_to_be_written():
     check_ending("p.PNG", "preview is a picture", ".png", ".svg")
-    with pytest.raises(FileFormatError, match=r"p\.jpg.*\.png"):
+    with pytest.raises(FileFormatError, match=r"p\.jpg: the preview is a picture and its name ends in \.png or \.svg$"):
         check_ending("p.jpg", "preview is a picture", ".png", ".svg")

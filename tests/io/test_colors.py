@@ -5,7 +5,7 @@ import pytest
 
 from glsk_o3d import samples, skeletonize
 from glsk_o3d.analysis import branch_table
-from glsk_o3d.analysis.segmentation import thickness
+from glsk_o3d.analysis.segmentation import thickness_of_points
 from glsk_o3d.errors import InvalidParameterError
 from glsk_o3d.io.colors import COLOR_NAMES, UNKNOWN_GREY, shades, thickness_shades
 
@@ -37,7 +37,8 @@ def test_thickness_is_teal_where_it_is_one_and_of_a_vertex_the_median_of_its_poi
     np.testing.assert_array_equal(shown[[0, 4, 5]], [shown[1], shown[3], UNKNOWN_GREY])
     np.testing.assert_allclose(shown[2], [0.128, 0.567, 0.551], atol=0.01)
     skeleton = skeletonize(samples.torus(500).points)
-    of_points, count = thickness(skeleton), np.bincount(skeleton.vertex_of_point)
+    of_points = thickness_of_points(skeleton, skeleton.points, skeleton.vertex_of_point)
+    count = np.bincount(skeleton.vertex_of_point)
     vertex = int(np.argmax(count % 2))
     median = np.median(of_points[skeleton.vertex_of_point == vertex])
     shown = shades(skeleton, "thickness", np.zeros(1, int), np.array([vertex]))

@@ -1,8 +1,7 @@
-"""Recipes: round trips, what is refused and how, what a report holds, and rerun."""
+"""Recipes: round trips, what is refused and how, what a report holds."""
 
 import dataclasses
 import json
-import os
 import re
 
 import numpy as np
@@ -18,7 +17,6 @@ from glsk_o3d import (
     Contractor,
     Denoiser,
     ExplainedScore,
-    InvalidParameterError,
     LPRReducer,
     OutlierRemover,
     Pipeline,
@@ -27,21 +25,17 @@ from glsk_o3d import (
     RingBuilder,
     RingSizeRatio,
     Sampler,
-    SkeletonWarning,
     Thinner,
     load_recipe,
     pipelines,
-    rerun,
     samples,
     save_recipe,
     save_skeleton,
     skeletonize,
 )
 from glsk_o3d.io.formats.fields import ARRAYS
-from glsk_o3d.pipeline import Filter, after, recipe_of, with_stage
+from glsk_o3d.pipeline import Filter, recipe_of
 from glsk_o3d.recipes import from_recipe, to_recipe
-from glsk_o3d.recipes.catalogue import BUILTIN
-from glsk_o3d.report import Report
 
 POINTS = samples.y_junction(n=500).points
 HEAD = {"glsk_o3d": {"version": 1}}
@@ -93,12 +87,6 @@ def test_every_parameter_of_every_filter_survives(made):
         assert repr(again) == repr(pipeline)  # 3 is not 3.0
 
 
-def test_the_round_trip_is_over_everything():
-    """So that a new filter is not forgotten above."""
-    kinds = [*pipelines.default().stages, LPRReducer()]
-    assert {*BUILTIN} == {*(type(each).__name__ for each in kinds), *RULES}
-
-
 @pytest.mark.parametrize("ending", ["json", "toml", "JSON"])
 def test_files(tmp_path, ending):
     path = tmp_path / f"räcipe.{ending}"
@@ -119,15 +107,6 @@ def test_what_a_recipe_looks_like():
     assert connector["radius"] == "3%"
 
 
-def test_values_of_other_types_are_written_as_plain_ones():
-    pipeline = Pipeline(
-        Sampler(size=np.int64(2000), frame=np.str_("box")), OutlierRemover(outlier_factor=np.float32(2.5))
-    )
-    recipe = to_recipe(pipeline)
-    assert {type(value) for table in recipe["pipeline"] for value in table.values()} == {str, int, float, bool}
-    assert from_recipe(json.loads(json.dumps(recipe))) == pipeline
-
-
 def test_what_is_left_out_has_its_default():
     recipe = one("Contractor", reducer={"filter": "LPRReducer", "phi": 2}, max_iterations=3)
     assert from_recipe(recipe) == Pipeline(Contractor(reducer=LPRReducer(phi=2), max_iterations=3))
@@ -139,24 +118,15 @@ def test_what_is_left_out_has_its_default():
 # ---- a named pipeline with changes
 
 
-def test_extends(tmp_path):
-    text = """
-        extends = "default"
-        glsk_o3d.version = 1
-        [set.RingSizeRatio]
-        threshold = 0.5
-        [set.Contractor]
-        stop.rule = "RingSizeRatio"
-        max_iterations = 7
-        [set.LPRReducer]
-        phi = 3e5
-        [set.Connector]
-        radius = "4%"
-    """
-    (tmp_path / "r.toml").write_text(text)
+def test_extends():
+    changes = {
+        "RingSizeRatio": {"threshold": 0.5},
+        "Contractor": {"stop": {"rule": "RingSizeRatio"}, "max_iterations": 7},
+    }
+    found = from_recipe(changed(**changes, LPRReducer={"phi": 3e5}, Connector={"radius": "4%"}))
     *rings, _, _, refiner, tracer = pipelines.default().stages
     contractor = Contractor(reducer=LPRReducer(phi=3e5), stop=RingSizeRatio(0.5), max_iterations=7)
-    assert load_recipe(tmp_path / "r.toml") == Pipeline(*rings) | contractor | Connector(radius="4%") | refiner | tracer
+    assert found == Pipeline(*rings) | contractor | Connector(radius="4%") | refiner | tracer
     for name, make in pipelines.PIPELINES.items():
         assert from_recipe({**HEAD, "extends": name}) == make()
 
@@ -181,42 +151,28 @@ def changed(**changes):
 WRONG = [  # where it is wrong, the words that help, and the recipe
     ("glsk_o3d.version", '{"glsk_o3d": {"version": 1}, "pipeline": [...]}', {"pipeline": [GOOD]}),
     ("glsk_o3d.version", "update", {"glsk_o3d": {"version": 2}, "stages": "of whatever shape"}),
-    ("glsk_o3d.extra", "there are version", {"glsk_o3d": {"version": 1, "extra": 4}, "pipeline": [GOOD]}),
     ("", "not [{'filter': 'RingBuilder'}]", [GOOD]),
     ("piepline", "'pipeline'", {**HEAD, "piepline": [GOOD]}),
     ("", "lacks both", HEAD),
-    ("", "has both", {**with_stages(GOOD), "extends": "default"}),
+    ("pipeline", "there are glsk_o3d, extends, set", {**with_stages(GOOD), "extends": "default"}),
     ("pipeline", "[]", with_stages()),
     ("pipeline[1]", '{"filter": NAME, ...}', with_stages(GOOD, "Contractor")),
     ("pipeline[1].filter", "'Contractor'", with_stages(GOOD, {"filter": "Contracter"})),
     ("pipeline[0].filter", "RingBuilder, Contractor, LPRReducer, Connector, Refiner", one("ExplainedScore")),
     ("pipeline[0].kk", "'k'", one("RingBuilder", kk=20)),
     ("pipeline[0].frame", "'spread', 'box'", one("Sampler", frame=["box"])),
-    ("pipeline[0].reduce_above", "it is gone, leave it out", one("Contractor", reduce_above=500)),
-    ("pipeline[0].min_support", "it is gone, leave it out", one("Connector", min_support=0.1)),
-    ("pipeline[0].root", "it is Tracer's, a filter of its own behind the Refiner", one("Refiner", root="z")),
-    ("pipeline[0].surface", "it is Tracer's, a filter of its own behind the Refiner", one("Refiner", surface=0)),
-    (
-        "pipeline[0].thin_to",
-        "it is Thinner's, a filter of its own ahead of the RingBuilder",
-        one("RingBuilder", thin_to=9),
-    ),
-    ("pipeline[0].radius", "100%", one("Connector", radius="200%")),
-    ("pipeline[0].outlier_factor", "nan", one("OutlierRemover", outlier_factor=float("nan"))),
     ("pipeline[0].reducer.phi", "above 0", one("Contractor", reducer={"filter": "LPRReducer", "phi": -1})),
     (
         "pipeline[0].reducer.filter",
         "there are Contractor, LPRReducer",
         one("Contractor", reducer={"filter": "Refiner"}),
     ),
-    ("pipeline[0].stop", '{"rule": NAME, ...}', one("Contractor", stop={"filter": "RingSizeRatio"})),
     ("pipeline[0].stop.rule", "'RingSizeRatio'", one("Contractor", stop={"rule": "RingRatio"})),
     ("pipeline", "RingBuilder | Contractor | Connector | Refiner", with_stages(*[{"filter": "Connector"}] * 2)),
     ("pipeline[0].reducer", "a function", one("Contractor", reducer={"unwritten": "a function"})),
     ("extends", "default, tree, wen2024, cao2010", {**HEAD, "extends": "best"}),
-    ("set", "'extends'", {**with_stages(GOOD), "set": {}}),
+    ("set", "there are glsk_o3d, pipeline", {**with_stages(GOOD), "set": {}}),
     ("set.Connecter", "'Connector'", changed(Connecter={"radius": 1})),
-    ("set.Connector.radios", "'radius'", changed(Connector={"radios": 1})),
     ("set", "LPRReducer.phi: ", {**HEAD, "extends": "cao2010", "set": {"LPRReducer": {"phi": 1}}}),
 ]
 
@@ -238,7 +194,6 @@ def test_wrong_recipes(tmp_path, place, words, recipe):
     ("name", "content", "words"),
     [
         ("r.json", b'{"glsk_o3d": {"version": 1},\n "pipeline": [}', "JSON.* line 2"),
-        ("r.json", b'{"a": 1, "b": {"k": 1, "k": 2}}', "'k'"),
         ("r.json", b"\xff\xfe", "JSON"),
         ("r.json", b'{"a":' * 600 + b"1" + b"}" * 600, ""),
         ("r.toml", b"[glsk_o3d]\nversion = ", "TOML"),
@@ -252,11 +207,6 @@ def test_files_that_are_no_recipes(tmp_path, name, content, words):
     path.write_bytes(content)
     with pytest.raises(RecipeError, match=f"^{re.escape(str(path))}: .*{words}"):
         load_recipe(path)
-
-
-def test_a_byte_order_mark_is_no_mistake(tmp_path):
-    (tmp_path / "r.json").write_bytes(b"\xef\xbb\xbf" + json.dumps({**HEAD, "extends": "default"}).encode())
-    assert load_recipe(tmp_path / "r.json") == pipelines.default()
 
 
 def test_files_that_are_not_there(tmp_path):
@@ -294,7 +244,7 @@ def never(iterations):
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
 def test_what_no_recipe_can_hold_breaks_no_run(tmp_path, stage, place, name, key):
     pipeline = RingBuilder() | stage | Connector() | Refiner()
-    with pytest.raises(RecipeError, match=rf"^{re.escape(place)}: .*\.{name}"):
+    with pytest.raises(RecipeError, match=rf"^{re.escape(place)}.*{name}"):
         save_recipe(pipeline, tmp_path / "r.json")
     assert list(tmp_path.iterdir()) == []
     skeleton = pipeline(POINTS)
@@ -304,7 +254,7 @@ def test_what_no_recipe_can_hold_breaks_no_run(tmp_path, stage, place, name, key
     table = recipe["pipeline"][1]
     assert key in (table[place.split(".")[1]] if "." in place else table)
     with pytest.raises(RecipeError, match=rf"^{re.escape(place)}.*{name}"):
-        rerun(skeleton)
+        from_recipe(recipe)
 
 
 def test_a_class_of_another_module_is_named_with_it():
@@ -317,14 +267,8 @@ def test_a_class_of_another_module_is_named_with_it():
     with pytest.raises(RecipeError, match=rf"^pipeline\[0\]\.from: .*{re.escape(__name__)}"):
         from_recipe(one("LPRReducer", **{"from": __name__}))
     namesake = dataclasses.make_dataclass("Refiner", [], bases=(Homemade,), frozen=True, kw_only=True)
-    with pytest.raises(RecipeError, match=r"^pipeline\[0\]: .*Refiner"):
+    with pytest.raises(RecipeError, match=r"^pipeline\[0\]\.from: 'Refiner' of types is not among"):
         to_recipe(Pipeline(namesake()))
-
-
-def test_a_wrong_parameter_is_not_written(tmp_path):
-    with pytest.raises(InvalidParameterError, match=r"RingBuilder\.k"):
-        save_recipe(Pipeline(RingBuilder(k=1)), tmp_path / "r.json")
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_documentation(root, install):
@@ -343,7 +287,11 @@ def test_the_documentation(root, install):
     assert skeletonize(points, "slab").report.n_input == (np.abs(points[:, 2] - 0.5) <= 0.5).sum() > 0
 
 
-# ---- what a report holds, and rerun
+# ---- what a report holds
+
+
+def repeated(skeleton, cloud):
+    return from_recipe(skeleton.report.recipe)(cloud)
 
 
 @pytest.mark.parametrize(
@@ -360,19 +308,10 @@ def test_results_repeat_to_the_last_bit(tmp_path, name, ending):
     save_skeleton(skeleton, tmp_path / f"s.{ending}")
     read = glsk.read_skeleton(tmp_path / f"s.{ending}")
     assert read.report.recipe == skeleton.report.recipe
-    for again in (rerun(read), rerun(rerun(skeleton), points)):
+    for again in (repeated(read, read.points), repeated(repeated(skeleton, skeleton.points), points)):
         for field in ARRAYS:
             np.testing.assert_array_equal(getattr(again, field), getattr(skeleton, field))
         assert again.report.recipe == skeleton.report.recipe
-
-
-def test_results_composed_by_hand_have_the_same_recipe():
-    pipeline = RingBuilder() | Contractor(max_iterations=1) | LPRReducer() | Contractor() | Connector() | Refiner()
-    by_hand = POINTS
-    for stage in pipeline.stages:
-        by_hand = stage(by_hand)
-    assert by_hand.report.recipe == pipeline(POINTS).report.recipe == to_recipe(pipeline)
-    np.testing.assert_array_equal(rerun(by_hand).vertices, by_hand.vertices)
 
 
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
@@ -381,78 +320,18 @@ def test_a_run_that_the_caller_stopped_cannot_be_repeated():
     stopped = skeletonize(POINTS, pipeline, on_iteration=lambda record: record.iteration < 3)
     assert [("unwritten" in stage) for stage in stopped.report.recipe["pipeline"]] == [False, False, True, True]
     with pytest.raises(RecipeError, match=r"^pipeline\[2\]: .*solve 3"):
-        rerun(stopped)
+        from_recipe(stopped.report.recipe)
     whole = skeletonize(POINTS, pipeline, on_iteration=lambda record: None)
     assert whole.report.recipe == to_recipe(pipeline)
 
 
-def test_progress_of_a_rerun_and_a_result_that_others_made():
-    skeleton, told, begun = skeletonize(POINTS), [], []
-    rerun(skeleton, on_iteration=told.append, on_stage=begun.append)
-    assert len(told) == len(skeleton.report.iterations)
-    assert tuple(begun) == pipelines.default().stages
-    old = {**skeleton.report.versions, "numpy": "1.0"}
-    moved = dataclasses.replace(
-        skeleton, vertices=skeleton.vertices + 1e-15, report=dataclasses.replace(skeleton.report, versions=old)
-    )
-    with pytest.warns(SkeletonWarning, match=f"numpy 1.0 .*{np.__version__}"):
-        rerun(moved)
-
-
-def test_old_results_load_but_have_no_recipe(tmp_path):
-    save_skeleton(skeletonize(POINTS), tmp_path / "s.json")
-    data = json.loads((tmp_path / "s.json").read_text())
+def test_a_result_is_a_recipe_too_but_not_an_old_one(tmp_path):
+    path = tmp_path / "s.json"
+    save_skeleton(skeletonize(POINTS, k=20), path)
+    assert load_recipe(path) == pipelines.default().with_options(k=20)
+    data = json.loads(path.read_text())
     del data["report"]["recipe"]
-    (tmp_path / "old.json").write_text(json.dumps(data))
-    old = glsk.read_skeleton(tmp_path / "old.json")
-    assert old.report.stages
-    assert old.report.recipe == {}
-    with pytest.raises(RecipeError):
-        rerun(old)
-    save_skeleton(old, tmp_path / "s.ply")
-    read = glsk.read_skeleton(tmp_path / "s.ply")
-    for begun in (read, Refiner(handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)(read)):
-        with pytest.raises(RecipeError):
-            rerun(begun)
-
-
-def test_results_without_their_points():
-    skeleton = dataclasses.replace(skeletonize(POINTS), points=None, vertex_of_point=None, normals=None)
-    with pytest.raises(RecipeError, match="scan"):
-        rerun(skeleton)
-    other = samples.torus(n=400).points
-    np.testing.assert_array_equal(rerun(skeleton, other).vertices, skeletonize(other).vertices)
-
-
-@pytest.mark.parametrize("recipe", [5, [], "x", {"pipeline": {}}])
-def test_a_report_with_a_malformed_recipe(recipe):
-    with pytest.raises(ValueError, match="recipe"):
-        Report.from_dict({"recipe": recipe})
-
-
-def test_reports_ahead_add_up():
-    ahead = with_stage(Report(), RingBuilder(), 1.0)
-    report = after(with_stage(with_stage(Report(n_input=3), RingBuilder(k=9), 0.5), Refiner(), 0.25), ahead)
-    assert report.stages == tuple(map(repr, (RingBuilder(), RingBuilder(k=9), Refiner())))
-    assert report.seconds == {"RingBuilder": 1.5, "Refiner": 0.25}
-    assert report.recipe == recipe_of(*(stage.table() for stage in (RingBuilder(), RingBuilder(k=9), Refiner())))
-    assert report.n_input == 3
-
-
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes")
-def test_what_may_never_end_is_not_waited_for(tmp_path):
-    os.mkfifo(tmp_path / "r.toml")
-    with pytest.raises(RecipeError, match=r"r\.toml: is a folder, a pipe or a device, not a file"):
-        load_recipe(tmp_path / "r.toml")
-
-
-@pytest.mark.parametrize("place", [(), ("glsk_o3d",), ("set",), ("set", "RingBuilder")])
-def test_an_unknown_name_is_not_repeated_at_length(place):
-    recipe = {**HEAD, "glsk_o3d": {"version": 1}, "extends": "default", "set": {"RingBuilder": {}}}
-    table = recipe
-    for key in place:
-        table = table[key]
-    table["long" * 10_000] = {}
-    with pytest.raises(RecipeError, match="longlong") as refused:
-        from_recipe(recipe)
-    assert len(str(refused.value)) < 1500
+    path.write_text(json.dumps(data))
+    assert glsk.read_skeleton(path).report.stages
+    with pytest.raises(RecipeError, match=r"s\.json: a recipe is a table such as"):
+        load_recipe(path)

@@ -59,10 +59,10 @@ class FakeNode:
     given = {}  # noqa: RUF012 - parameters from outside
 
     def __init__(self, name):
-        self.name, self.published, self.logged, self.topics = name, [], [], {}
+        self.name, self.published, self.logged, self.topics, self.defaults = name, [], [], {}, {}
 
     def declare_parameter(self, name, default):
-        value = self.given.get(name, default)
+        self.defaults[name], value = default, self.given.get(name, default)
         assert type(value) is type(default), name  # rclpy refuses other types, too
         assert value != [], name  # and takes this for bytes
         return SimpleNamespace(value=value)

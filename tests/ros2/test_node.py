@@ -71,27 +71,20 @@ def test_parameters_choose_pipeline_and_settings(ros, cloud, points, tmp_path, r
     np.testing.assert_array_equal(line_ends(same.published[0][1], rows), line_ends(node.published[0][1], rows))
 
 
-def test_with_an_opening_poses_are_grasps(ros, cloud, expected, rows):
-    node = ros.node(opening=0.6)
-    node.on_cloud(cloud)
-    grasps = grasp_candidates(expected, 0.6)
-    assert len(grasps) > 8
-    poses = node.published[1][1].poses
-    np.testing.assert_array_equal(rows(pose.position for pose in poses), grasps.position)
-    turns = Rotation.from_quat([[q.x, q.y, q.z, q.w] for q in (pose.orientation for pose in poses)]).as_matrix()
-    np.testing.assert_allclose(turns[:, :, 0], grasps.closing, atol=1e-12)
-    np.testing.assert_allclose(turns[:, :, 2], grasps.approach, atol=1e-12)
-
-
-def test_grasps_keep_above_a_table_and_in_a_cone(ros, cloud, expected, rows):
+def test_with_an_opening_poses_are_grasps_above_a_table_and_in_a_cone(ros, cloud, expected, rows):
     table, where = [0.0, 0.0, 1.0, 0.25], [0.0, 1.0, -1.0]
-    node = ros.node(opening=0.6, plane=table, approach=where, approach_angle=50.0)
-    node.on_cloud(cloud)
-    grasps = grasp_candidates(expected, 0.6, obstacles=table, cone=(where, 50))
-    assert (
-        8 < len(grasps) < len(grasp_candidates(expected, 0.6, cone=(where, 50))) < len(grasp_candidates(expected, 0.6))
-    )
-    np.testing.assert_array_equal(rows(pose.position for pose in node.published[1][1].poses), grasps.position)
+    options = dict(obstacles=[table], cone=(where, 50))
+    for more, less in (({}, {}), (dict(plane=table, approach=where, approach_angle=50.0), options)):
+        node = ros.node(opening=0.6, **more)
+        node.on_cloud(cloud)
+        grasps = grasp_candidates(expected, 0.6, **less)
+        assert len(grasps) > 8
+        poses = node.published[1][1].poses
+        np.testing.assert_array_equal(rows(pose.position for pose in poses), grasps.position)
+        turns = Rotation.from_quat([[q.x, q.y, q.z, q.w] for q in (pose.orientation for pose in poses)]).as_matrix()
+        np.testing.assert_allclose(turns[:, :, 0], grasps.closing, atol=1e-12)
+        np.testing.assert_allclose(turns[:, :, 2], grasps.approach, atol=1e-12)
+    assert len(grasps) < len(grasp_candidates(expected, 0.6, cone=(where, 50))) < len(grasp_candidates(expected, 0.6))
 
 
 def test_without_a_grasp_the_markers_go_out_with_a_warning(ros, cloud):
@@ -130,10 +123,7 @@ def test_a_bad_cloud_is_one_warning_and_the_next_is_served(ros, cloud, header, m
         (dict(set=["k=no"]), "k = 'no'"),
         (dict(opening=float("nan")), "opening = nan"),
         (dict(plane=[0.0, 0.0, 1.0]), r"plane = \[0.0, 0.0, 1.0\]: must be a, b, c, d"),
-        (dict(plane=[0.0, 0.0, 0.0, 0.7]), "is no plane"),
-        (dict(approach=[0.0, 0.0, 0.0]), "the direction of cone"),
         (dict(plane=[0.0, 0.0, 1.0, 0.0]), "are for grasps: give the opening"),
-        (dict(approach_angle=60.0), "are for grasps: give the opening"),
         (dict(approach_angle=181.0), "the angle of cone = 181.0: .* at most 180"),
     ],
 )

@@ -55,7 +55,7 @@ def make(
     with reporting(quiet=quiet, verbose=verbose):
         from . import make as make_folder
 
-        with progress(not quiet, remaining=True) as update:
+        with progress(remaining=True) as update:
             update("drawing shapes")
             made = make_folder(
                 folder,
@@ -118,7 +118,7 @@ def run(
     with reporting(quiet=quiet, verbose=verbose):
         from . import run as run_program
 
-        with progress(not quiet, remaining=True) as update:
+        with progress(remaining=True) as update:
 
             def step(name: str, outcome: Outcome, done: int, total: int) -> None:
                 update(name, done, total)
@@ -161,12 +161,12 @@ def score(
 ) -> None:
     """Score the answers of a program. What is missing or unreadable counts as a failure."""
     with reporting(quiet=quiet, verbose=verbose):
-        from glsk_o3d.cli.outputs import REPORT_FILE, check_outputs
+        from glsk_o3d.cli.outputs import check_outputs, json_output
 
         from . import leaderboard, score_answers
 
-        check_outputs([(output, *REPORT_FILE)])
-        with progress(not quiet, remaining=True) as update:
+        check_outputs([json_output(output)])
+        with progress(remaining=True) as update:
             update("reading")
             results = score_answers(folder, answers, name=name, on_cloud=update)
         results.save(output)
@@ -197,7 +197,7 @@ def sample(
     with reporting(quiet=quiet, verbose=verbose):
         from . import sample as sample_objects
 
-        with progress(not quiet, remaining=True) as update:
+        with progress(remaining=True) as update:
             update("reading")
             options: dict[str, Any] = {"version": version, "draws": draws, "n": points, "noise": noise}
             made = sample_objects(folder, meshes, **options, on_object=update)
@@ -224,13 +224,13 @@ def repeat(
 ) -> None:
     """Compare the answers to several clouds of each object with each other. What is missing counts as a failure."""
     with reporting(quiet=quiet, verbose=verbose):
-        from glsk_o3d.cli.outputs import REPORT_FILE, check_outputs
+        from glsk_o3d.cli.outputs import check_outputs, json_output
 
         from . import repeat as compare_answers
 
         files = [] if output is None else [output]
-        check_outputs([(path, *REPORT_FILE) for path in files])
-        with progress(not quiet, remaining=True) as update:
+        check_outputs([json_output(output)])
+        with progress(remaining=True) as update:
             update("reading")
             found = compare_answers(folder, answers, name=name, on_object=update)
         for path in files:
@@ -258,12 +258,13 @@ def table(
 ) -> None:
     """Compare programs: means with intervals, for all clouds and by kind."""
     with reporting(quiet=quiet, verbose=verbose):
-        from glsk_o3d.cli.outputs import check_outputs
+        from glsk_o3d.cli.outputs import Output, check_outputs
 
-        from . import leaderboard, read_results
+        from . import Leaderboard, leaderboard, read_results
 
         files = output or []
-        check_outputs([(path, (".md", ".json"), "table is Markdown or JSON") for path in files], *scores)
+        endings, what = (".md", ".json"), "table is Markdown or JSON"
+        check_outputs([Output(path, endings, what, Leaderboard.save) for path in files], *scores)
         board = leaderboard(map(read_results, scores))
         for path in files:
             board.save(path)

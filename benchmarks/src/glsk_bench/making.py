@@ -130,7 +130,7 @@ def _done(todo: Mapping[str, Callable[[], Told]], jobs: int) -> Iterator[tuple[s
     if jobs == 1:
         yield from ((name, job()) for name, job in todo.items())
         return
-    workers, waiting = LocalWorkers(min(jobs, max(len(todo), 1)), load=False), list(todo.items())
+    workers, waiting = LocalWorkers(min(jobs, max(len(todo), 1))), list(todo.items())
     running: dict[Future, str] = {}
     try:
         while waiting or running:

@@ -16,7 +16,6 @@ from typing import NamedTuple, TextIO
 
 import numpy as np
 
-from ...interop.packages import following_open3d
 from ..paths import check_line, check_promised
 from ..scan import COLOR_CHANNELS, NORMAL_NAMES, NoPoints, Scan, scan_of
 
@@ -147,8 +146,7 @@ def _rows(stream: TextIO, layout: Layout, path: Path) -> np.ndarray:
     if lost > len(rows):
         raise NoPoints(f"{lost} of {lost + len(rows)} lines hold no point; decimal commas are not understood")
     if lost:
-        with following_open3d():
-            _log.warning("%s: %d of %d lines hold no point and were skipped", path, lost, lost + len(rows))
+        _log.warning("%s: %d of %d lines hold no point and were skipped", path, lost, lost + len(rows))
     return rows
 
 

@@ -287,11 +287,6 @@
   const say = (solve) => {
     element("caption").textContent = data.captions[solve];
     document.querySelectorAll("[data-solve]").forEach((row) => row.classList.toggle("now", +row.dataset.solve === solve));
-    document.querySelectorAll(".cursor").forEach((line) => {
-      const mark = line.parentNode.querySelector(`[data-at="${solve}"]`);
-      line.style.visibility = mark ? "visible" : "hidden";
-      if (mark) for (const end of ["x1", "x2"]) line.setAttribute(end, mark.getAttribute("cx"));
-    });
   };
   const stop = () => {
     playing = false;

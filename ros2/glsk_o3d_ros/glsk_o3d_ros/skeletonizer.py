@@ -81,7 +81,7 @@ class Skeletonizer:
         self.make, self.min_points = make, min_points
         self.gripper = Gripper(opening) if opening else None
         self.where = {
-            "obstacles": obstacle_list(list(plane) if any(plane) else None),
+            "obstacles": obstacle_list([plane] if any(plane) else []),
             "cone": (approach, approach_angle),
         }
         if not opening and (any(plane) or approach_angle < 180):

@@ -74,7 +74,7 @@ def ends(robot, uses="collisions"):
 def grown():
     """A plant with forks as a tree of a hundred vertices or so."""
     skeleton = pipelines.tree()(samples.tree(6000, forks=3, seed=1).points)
-    return reroot(simplify(skeleton, n=100), "z")
+    return reroot(simplify(skeleton, tolerance=0.005), "z")
 
 
 @pytest.mark.parametrize("uses", ["collisions", "visuals"])

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
-from .vectors import TINY
+from ..numerics.vectors import TINY
 
 TRIPLES = 500  # derived: with half of the points astray 99.9 % of the draws have fifty triples that are on the circle
 SCORED = 1000  # speed: points that judge the triples

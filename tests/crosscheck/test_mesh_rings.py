@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from glsk_o3d.numerics.mesh_rings import clean_faces, common_share, umbrellas
+from glsk_o3d.crosscheck.mesh_rings import clean_faces, common_share, umbrellas
 from glsk_o3d.numerics.rings import Rings
 
 OCTAHEDRON = np.array([[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]])
