@@ -48,11 +48,6 @@ class TestLabels:
         assert placed.is_handle(np.arange(17)[::-1])
         assert not placed.is_handle(np.array([*range(10), *range(8, 0, -1)]))
 
-    def test_of_a_loop_over_parts_that_are_not_joined_nothing_is_said(self, asking):
-        axis = tubes([[0, 0, 0], [1, 0, 0]], [[0, 0.3, 0], [1, 0.3, 0]])
-        placed = asking.Placed(axis, np.array([[0, 0, 0], [1, 0, 0], [1, 0.3, 0], [0, 0.3, 0]], float))
-        assert placed.is_handle(np.arange(4)) is None
-
     def test_a_false_edge_between_parallel_tubes_crosses_air(self, asking):
         axis = tubes([[0, 0, 0], [2, 0, 0]], [[0, 0.3, 0], [2, 0.3, 0]])
         x = np.linspace(0, 1, 21)
@@ -68,16 +63,6 @@ class TestLabels:
         placed = asking.Placed(axis, np.array([[0, 0, 0], [0, 0.4, 0], [1.8, 0, 0], [2, 0.2, 0]]))
         assert placed.apart(np.array([0, 2]), np.array([1, 3])).tolist() == [True, False]
         assert placed.joined(np.array([0, 2]), np.array([1, 3])).tolist() == [False, True]
-
-    def test_a_gap_in_one_tube_is_bridged(self, asking):
-        placed = asking.Placed(tubes([[0, 0, 0], [2, 0, 0]]), np.array([[0.5, 0.02, 0], [1.1, 0, 0.02]]))
-        assert placed.joined(0, 1)
-
-    def test_the_place_of_a_thin_part_is_on_it(self, asking):
-        nodes = np.array([[0, 0, 0], [2, 0, 0], [1, 0, 0], [1, 1, 0]], float)
-        axis = Truth(nodes, [[0, 2], [2, 1], [2, 3]], np.array([0.3, 0.3, 0.3, 0.02]))
-        placed = asking.Placed(axis, np.array([[1, 0.8, 0], [0.9, 0.1, 0]]))
-        np.testing.assert_allclose(placed._points[placed.place][:, 1], [0.8, 0], atol=0.05)
 
     def test_asks_what_the_refiner_asks(self, asking, judging):
         """Of the same skeletons: what a clean cloud is asked has the probabilities that the report has."""
@@ -109,14 +94,6 @@ class TestArithmetic:
         plain = answered(judging, 200)  # an answer that one fact gives away has finite weights
         assert 2 < judging.fitted(plain._replace(is_so=plain.facts[:, 0] > 0))["one"] < 20
 
-    def test_calibrated_is_what_is_so_as_often_as_said(self, judging):
-        those = answered(judging)
-        chance = judging.said(dict(constant=-0.5, one=2, other=-1), those)
-        counts, means, often = zip(*judging.parts(chance, those), strict=True)
-        assert sum(counts) == len(chance)
-        np.testing.assert_allclose([it[0] for it in often], means, atol=0.05)
-        np.testing.assert_allclose(judging.without_family(those, those), chance, atol=0.05)
-
     def test_loss_and_area_in_closed_form(self, judging):
         is_so = np.array([True, True, False, False])
         assert judging.log_loss(np.full(4, 0.5), is_so) == pytest.approx(np.log(2))
@@ -132,21 +109,6 @@ class TestArithmetic:
         never = judging.measure(case, {"loop": {**before["loop"].weights, "constant": -99.0}})
         assert (whole["loops"], never["loops"]) == (0, -1)
         assert before == QUESTIONS
-
-    def test_the_table_of_transfer(self, judging):
-        rows = [
-            dict(family=family, shape=f"{family}_{seed}", variant="clean", weights=weights, topology=right, perfect=0.0)
-            for family in ("rings", "knots")
-            for seed in range(4)
-            for weights, right in ((judging.SEEN, 1.0), (judging.UNSEEN, float(family == "rings")))
-        ]
-        rows[-1] = {name: value for name, value in rows[-1].items() if name != "topology"} | {"failure": "no"}
-        _, header, lines = judging.table(rows)
-        assert [line[:2] for line in lines] == [["rings", "4"], ["knots", "4"], ["all", "8"]]
-        assert lines[0][2:5] == ["1.00", "1.00", "+0.00 [+0.00, +0.00]"]
-        assert lines[1][2:5] == ["1.00", "0.00", "-1.00 [-1.00, -1.00]"]
-        assert lines[2][4].startswith("-0.50 [")
-        assert len(header) == len(lines[0])
 
 
 class TestCommands:
@@ -171,16 +133,3 @@ class TestCommands:
         call("transfer", saved, small.path, "--jobs", 0, "--page", page)
         assert "| trees | 3 | 1.00 | 1.00 |" in page.read_text()
         assert "| all | 7 |" in page.read_text()
-
-    def test_families_are_left_out(self, call, tmp_path):
-        saved, rows = tmp_path / "questions.json", []
-        for family, slope in (("even", 1), ("odd", -1)):  # what one teaches is wrong of the other
-            those = [dict(about="limb", facts=dict(reach=slope * x), is_so=x > 0) for x in (-2, -1, -0.5, 0.5, 1, 2)]
-            rows.append(dict(shape=f"{family}_1", family=family, questions=those))
-        saved.write_text(json.dumps(dict(rows=rows)))
-        lines = call("check", saved, "--leave-family-out", "--markdown").splitlines()
-        assert [line.split("|")[-2].strip() for line in lines if "even" in line or "odd" in line] == ["0.000"] * 2
-
-    @pytest.mark.parametrize("wrong", [("nowhere",), ("--page", "nowhere.md"), ("--from", "nowhere.json")])
-    def test_what_is_not_there_is_said(self, call, wrong):
-        call("check", *wrong, code=2)

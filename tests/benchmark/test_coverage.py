@@ -39,13 +39,6 @@ def test_long_gaps_count_more_than_their_length(gap, least, most):
     assert least <= found <= most
 
 
-@pytest.mark.parametrize(("gap", "least", "most"), [(0.12, 0.98, 0.999), (0.22, 0.96, 0.96)])
-def test_a_long_gap_spoils_what_is_shown_otherwise(gap, least, most):
-    one = tubes(*np.arange(8) / 2)
-    missing = (np.abs(one.points[:, 0] - 0.5) < gap / 2) & (one.points[:, 1] < 0.2)
-    assert least <= coverage(one, one.points[~missing]) <= most
-
-
 def test_points_of_a_part_nearby_show_nothing_of_this_one():
     one = tubes(0, 0.14)
     assert coverage(one, one.points[one.points[:, 1] < 0.07]) == 0.5

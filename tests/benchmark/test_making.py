@@ -2,8 +2,6 @@
 
 import json
 import sys
-from concurrent.futures import Future
-from concurrent.futures.process import BrokenProcessPool
 
 import numpy as np
 import pytest
@@ -13,7 +11,7 @@ from glsk_bench.shapes import shape
 from glsk_bench.truths import THING_ARRAYS, ThingTruth
 
 from glsk_o3d import read_cloud
-from glsk_o3d.errors import BatchError, FileFormatError, InvalidParameterError
+from glsk_o3d.errors import FileFormatError, InvalidParameterError
 
 CHOICE = dict(families=["tubes", "trees"], seeds=[100, 101], variants=["clean", "scan2"], jobs=1)
 
@@ -54,12 +52,6 @@ def test_clouds_and_axes_are_those_drawn(small, rods):
     truth = small.truth("tubes_101")
     for name in ("nodes", "edges", "radii"):
         np.testing.assert_array_equal(getattr(truth, name), getattr(tube, name))
-
-
-def test_the_same_again_makes_nothing_and_changes_nothing(small, rods):
-    before, times = everything(small.path), len(rods)
-    make(small.path, **CHOICE)
-    assert (everything(small.path), len(rods)) == (before, times)
 
 
 def test_an_interrupted_one_goes_on(small, rods, tmp_path):
@@ -154,14 +146,6 @@ def test_wrong_words(rods, tmp_path, wrong, said):
     assert rods == []
 
 
-def test_another_version_is_not_mixed_in(small, monkeypatch):
-    monkeypatch.setitem(versions.VERSIONS, "v0", versions.VERSIONS["v1"].__class__("v0", *[()] * 3, 1, 0, (), 1))
-    told = json.loads((small.path / INDEX_NAME).read_text())
-    (small.path / INDEX_NAME).write_text(json.dumps({**told, "version": "v0", "shapes": {}}))
-    with pytest.raises(InvalidParameterError, match="has version v0, not v1"):
-        make(small.path, **CHOICE)
-
-
 @pytest.mark.parametrize(
     "text",
     [
@@ -205,14 +189,3 @@ def test_in_two_processes_it_is_the_same_and_what_is_known(tmp_path):
     same = [cloud["sameness"] for told in together.shapes.values() for cloud in told["clouds"].values()]
     assert len(same) == 4
     assert set(same) <= {"bits", "rounding"}  # as the package knows them
-
-
-def test_a_process_that_dies_is_told(rods, tmp_path, monkeypatch):
-    def submit(self, job):
-        done = Future()
-        done.set_exception(BrokenProcessPool())
-        return done
-
-    monkeypatch.setattr("glsk_bench.making.LocalWorkers.submit", submit)
-    with pytest.raises(BatchError, match="the process died"):
-        make(tmp_path, **{**CHOICE, "jobs": 2})

@@ -1,15 +1,10 @@
 """Things: distances and areas in closed form, what is known of their axes, what is refused, and the same for ever."""
 
-import importlib
-import sys
-
 import numpy as np
 import pytest
-from glsk_bench.clouds import VARIANTS, cloud, coverage
+from glsk_bench.clouds import cloud, coverage
 from glsk_bench.shapes import FAMILIES, Thing
-from glsk_bench.shapes.axis import UnfitDraw
 from glsk_bench.shapes.curves import generator, polygon
-from glsk_bench.shapes.drawing import DRAWN_BY
 from glsk_bench.shapes.things.fairness import fault_of
 from glsk_bench.shapes.things.field import distance, surface_of
 from glsk_bench.shapes.things.lines import X, Y
@@ -223,41 +218,4 @@ def test_what_is_refused_and_what_just_is_not(word, bad, good, spacing):
     assert fault_of(good, spacing) is None
 
 
-def test_a_paddle_whose_bars_differ_too_much_is_another_draw():
-    with pytest.raises(UnfitDraw, match="bars"):
-        DRAWN_BY["plates"](generator("paddle", 1044))
-
-
 # ------------------------------------------------------------------------------------------------------- the same again
-
-
-@pytest.fixture(scope="module")
-def yardstick(shared_dir):
-    """The program that these shapes come from; points of clouds are in an order that processors agree about."""
-
-    def draw(weights, n, rng):
-        fit = np.flatnonzero(weights > 0)
-        score = np.log(weights[fit]) + rng.gumbel(size=len(fit))
-        return fit[np.argsort(-score, kind="stable")[:n]]
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(shared_dir)
-        patch.setattr(sys, "dont_write_bytecode", True)
-        things = importlib.import_module("things")
-        patch.setattr(sys.modules["zoo"], "draw", draw)
-        yield things
-    for name in ("things", "zoo"):
-        del sys.modules[name]
-
-
-@pytest.mark.parametrize("family", FAMILIES["v2"])
-@pytest.mark.parametrize("seed", [107])
-def test_shapes_and_clouds_are_the_yardsticks_to_the_last_bit(family, seed, yardstick, drawn):
-    one, expected = drawn(family, seed), yardstick.shape(family, seed)
-    for name in ("nodes", "edges", "radii", "points", "normals", *THING_ARRAYS):
-        np.testing.assert_array_equal(getattr(one, name), expected[name])
-    assert one.facts == {name: value for name, value in expected.items() if not isinstance(value, np.ndarray)}
-    for variant in VARIANTS:
-        points = cloud(one, variant).astype(np.float32)
-        np.testing.assert_array_equal(points, yardstick.cloud(expected, variant, 4096).astype(np.float32))
-        assert coverage(one, points) == yardstick.coverage(expected, points)
