@@ -94,9 +94,26 @@ def benchmark(root):
     return imported
 
 
+@pytest.fixture(scope="module")
+def tool(request, benchmark):
+    """The benchmark that a test's module names TOOL, as a module."""
+    with benchmark(request.module.TOOL) as module:
+        yield module
+
+
+@pytest.fixture(scope="module")
+def parts(tool):
+    """The modules that it is made of, by their names."""
+    folder = Path(tool.__file__).parent
+    found = {name: module for name, module in sys.modules.items() if name.startswith("_")}
+    return SimpleNamespace(
+        **{n[1:]: each for n, each in found.items() if Path(getattr(each, "__file__", None) or "").parent == folder}
+    )
+
+
 @pytest.fixture
 def call(tool):
-    """Run a command of the benchmark that a test's module calls `tool`; gives what it printed."""
+    """Run a command of `tool`; gives what it printed."""
 
     def run(*arguments, code=0):
         result = CliRunner().invoke(tool.app, [*map(str, arguments)])

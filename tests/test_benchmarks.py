@@ -16,20 +16,9 @@ from glsk_o3d.batch import run_batch
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.samples import torus
 
+TOOL = "accuracy"
+
 FEW = ("--builtin", "--shapes", "torus", "--variant", "clean_512", "--jobs", 0)
-
-
-@pytest.fixture(scope="module")
-def tool(benchmark):
-    with benchmark("accuracy") as module:
-        yield module
-
-
-@pytest.fixture(scope="module")
-def parts(tool):
-    """The modules that it is made of, by their names."""
-    names = ("accuracy", "clouds", "runs", "stability", "tables")
-    return SimpleNamespace(**{name: sys.modules[f"_{name}"] for name in names})
 
 
 def row(shape="torus", variant="clean_512", pipeline="default", **values):

@@ -1,7 +1,6 @@
 """The calibration: its labels on shapes where they are plain, its arithmetic, and its commands on tiny clouds."""
 
 import json
-import sys
 
 import numpy as np
 import pytest
@@ -12,21 +11,7 @@ from glsk_o3d.decisions import QUESTIONS
 from glsk_o3d.pipelines import default
 from glsk_o3d.samples import y_junction
 
-
-@pytest.fixture(scope="module")
-def tool(benchmark):
-    with benchmark("calibrate") as module:
-        yield module
-
-
-@pytest.fixture(scope="module")
-def asking(tool):
-    return sys.modules["_questions"]
-
-
-@pytest.fixture(scope="module")
-def judging(tool):
-    return sys.modules["_calibration"]
+TOOL = "calibrate"
 
 
 def ring(n, turn=0.0):
@@ -41,33 +26,26 @@ def tubes(*lines):
 
 
 class TestLabels:
-    def test_the_loop_of_a_ring_is_a_handle_and_one_that_only_goes_to_and_fro_is_none(self, asking):
+    def test_the_loop_of_a_ring_is_a_handle_and_one_that_only_goes_to_and_fro_is_none(self, parts):
         axis = Truth(ring(40), np.column_stack([np.arange(40), np.roll(np.arange(40), -1)]), np.full(40, 0.1))
-        placed = asking.Placed(axis, ring(17, 0.3))
+        placed = parts.questions.Placed(axis, ring(17, 0.3))
         assert placed.is_handle(np.arange(17))
         assert placed.is_handle(np.arange(17)[::-1])
         assert not placed.is_handle(np.array([*range(10), *range(8, 0, -1)]))
 
-    def test_a_false_edge_between_parallel_tubes_crosses_air(self, asking):
+    def test_a_false_edge_between_parallel_tubes_crosses_air(self, parts):
         axis = tubes([[0, 0, 0], [2, 0, 0]], [[0, 0.3, 0], [2, 0.3, 0]])
         x = np.linspace(0, 1, 21)
         path = np.concatenate([np.column_stack([x, 0 * x, 0 * x]), np.column_stack([1 + x, 0 * x + 0.3, 0 * x])])
-        placed = asking.Placed(axis, path)
+        placed = parts.questions.Placed(axis, path)
         near = [placed.crosses_air(np.arange(42), k) for k in range(41)]
-        assert np.flatnonzero(near).tolist() == list(range(20 - asking.NEAR, 21 + asking.NEAR))
+        assert np.flatnonzero(near).tolist() == list(range(20 - parts.questions.NEAR, 21 + parts.questions.NEAR))
         assert not placed.joined(20, 21)
 
-    def test_a_long_way_round_is_air_and_a_corner_is_not(self, asking):
-        nodes = np.array([[0, 0, 0], [2, 0, 0], [2, 0.4, 0], [0, 0.4, 0]], float)
-        axis = Truth(nodes, [[0, 1], [1, 2], [2, 3]], np.full(4, 0.1))
-        placed = asking.Placed(axis, np.array([[0, 0, 0], [0, 0.4, 0], [1.8, 0, 0], [2, 0.2, 0]]))
-        assert placed.apart(np.array([0, 2]), np.array([1, 3])).tolist() == [True, False]
-        assert placed.joined(np.array([0, 2]), np.array([1, 3])).tolist() == [False, True]
-
-    def test_asks_what_the_refiner_asks(self, asking, judging):
+    def test_asks_what_the_refiner_asks(self, parts):
         """Of the same skeletons: what a clean cloud is asked has the probabilities that the report has."""
         cloud, pipeline = y_junction(1200), default()
-        found = [*asking.asked(cloud.points, Truth(cloud.nodes, cloud.edges, cloud.radii), pipeline)]
+        found = [*parts.questions.asked(cloud.points, Truth(cloud.nodes, cloud.edges, cloud.radii), pipeline)]
         told = [(about, bool(is_so)) for about, _, is_so in found]
         assert told.count(("limb", True)) == 3
         assert not {("limb", False), ("air", True)} & {*told}
@@ -77,38 +55,30 @@ class TestLabels:
         assert sorted(asked) == sorted((it.about, it.probability) for it in pipeline(cloud.points).report.decisions)
 
 
-def answered(judging, n=6000):
+def answered(parts, n=6000):
     """Questions whose answers are drawn with the probabilities of a logistic model."""
     rng = np.random.default_rng(0)
     facts = rng.normal(size=(n, 2))
     is_so = rng.random(n) < expit(facts @ [2, -1] - 0.5)
     shapes, families = ((np.arange(n) % several).astype(str) for several in (50, 3))
-    return judging.Answered(["one", "other"], facts, is_so, shapes, families)
+    return parts.calibration.Answered(["one", "other"], facts, is_so, shapes, families)
 
 
 class TestArithmetic:
-    def test_the_weights_that_made_the_answers_are_found(self, judging):
-        weights = judging.fitted(answered(judging))
+    def test_the_weights_that_made_the_answers_are_found(self, parts):
+        weights = parts.calibration.fitted(answered(parts))
         np.testing.assert_allclose([*weights.values()], [-0.5, 2, -1], atol=0.15)
         assert [*weights] == ["constant", "one", "other"]
-        plain = answered(judging, 200)  # an answer that one fact gives away has finite weights
-        assert 2 < judging.fitted(plain._replace(is_so=plain.facts[:, 0] > 0))["one"] < 20
+        plain = answered(parts, 200)  # an answer that one fact gives away has finite weights
+        assert 2 < parts.calibration.fitted(plain._replace(is_so=plain.facts[:, 0] > 0))["one"] < 20
 
-    def test_loss_and_area_in_closed_form(self, judging):
+    def test_loss_and_area_in_closed_form(self, parts):
         is_so = np.array([True, True, False, False])
-        assert judging.log_loss(np.full(4, 0.5), is_so) == pytest.approx(np.log(2))
-        assert np.isfinite(judging.log_loss(1.0 - is_so, is_so))
+        assert parts.calibration.log_loss(np.full(4, 0.5), is_so) == pytest.approx(np.log(2))
+        assert np.isfinite(parts.calibration.log_loss(1.0 - is_so, is_so))
         for chance, area in (([0.9, 0.8, 0.1, 0.2], 1), ([0.1] * 4, 0.5), ([0.9, 0.3, 0.5, 0.1], 0.75)):
-            assert judging.area_under_curve(np.array(chance), is_so) == area
-        assert np.isnan(judging.area_under_curve(np.ones(2), is_so[:2]))
-
-    def test_weights_are_used_and_put_back(self, judging):
-        case = sys.modules["_clouds"].Case("torus", "clean_512")
-        before = dict(QUESTIONS)
-        whole = judging.measure(case, {"loop": before["loop"].weights})
-        never = judging.measure(case, {"loop": {**before["loop"].weights, "constant": -99.0}})
-        assert (whole["loops"], never["loops"]) == (0, -1)
-        assert before == QUESTIONS
+            assert parts.calibration.area_under_curve(np.array(chance), is_so) == area
+        assert np.isnan(parts.calibration.area_under_curve(np.ones(2), is_so[:2]))
 
 
 class TestCommands:

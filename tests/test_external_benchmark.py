@@ -1,7 +1,5 @@
 """The readers of other people's data: tiny files of each kind, made up here, and what is bad in them."""
 
-import sys
-
 import numpy as np
 import open3d as o3d
 import pytest
@@ -9,20 +7,11 @@ from glsk_bench import read_folder
 
 from glsk_o3d import Skeleton, samples
 
+TOOL = "external"
+
 FORK = samples.y_junction(2000)
 BRANCHES = "v 0 0 0\nv 0 4 0\nv 0 8 0\nv 0 4 0\nv 3 7 0\nv 0 4 0\nv 0 7 3\nl 1 2 3\nl 4 5\nl 6 7\n"
 SWC = "# made up\n1 0 0 0 0 6 -1\n2 0 20 0 0 5 1\n3 0 40 0 0 4 2\n4 0 30 20 0 3 2\n5 0 40 40 5 2 4\n"
-
-
-@pytest.fixture(scope="module")
-def tool(benchmark):
-    with benchmark("external") as module:
-        yield module
-
-
-@pytest.fixture(scope="module")
-def reading(tool):
-    return sys.modules["_external"]
 
 
 def write_ply(path, points):
@@ -147,10 +136,10 @@ def test_clouds_of_vessels_are_drawn_of_the_round_cones(call, vessels, tmp_path)
         ("", "the file is empty"),
     ],
 )
-def test_a_bad_file_of_vessels_is_named(reading, tmp_path, text, said):
+def test_a_bad_file_of_vessels_is_named(parts, tmp_path, text, said):
     (tmp_path / "bad.swc").write_text(text)
     with pytest.raises(Exception, match=rf"bad\.swc: .*{said}"):
-        reading.read_axis(tmp_path / "bad.swc")
+        parts.external.read_axis(tmp_path / "bad.swc")
 
 
 def centrelines():
@@ -207,11 +196,11 @@ def test_arteries_and_what_is_bad_in_them(call, tmp_path):
     assert shape_of(made, "C1") == (1, 0, 4, 2)
 
 
-def test_lines_are_joined_where_they_part_and_not_where_they_touch(reading):
+def test_lines_are_joined_where_they_part_and_not_where_they_touch(parts):
     nodes, forks = np.vstack(centrelines()), []
     split = np.split(np.arange(603), 3)
     for order in ((0, 1, 2), (2, 0, 1), (1, 2, 0)):
-        edges = reading.joined(nodes, np.ones(603), [split[i] for i in order])
+        edges = parts.external.joined(nodes, np.ones(603), [split[i] for i in order])
         degree = np.bincount(edges.ravel(), minlength=603)
         assert ((degree == 1).sum(), (degree == 3).sum(), (degree > 3).sum()) == (4, 2, 0)
         assert len(edges) == (degree > 0).sum() - 1  # one tree

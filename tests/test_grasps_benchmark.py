@@ -8,11 +8,7 @@ import pytest
 from glsk_o3d import Skeleton, samples
 from glsk_o3d.analysis import Gripper, grasp_candidates
 
-
-@pytest.fixture(scope="module")
-def tool(benchmark):
-    with benchmark("grasps") as module:
-        yield module
+TOOL = "grasps"
 
 
 def test_what_is_inside_a_mug(tool):

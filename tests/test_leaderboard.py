@@ -3,9 +3,7 @@
 import os
 import re
 import signal
-import sys
 import time
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,19 +13,9 @@ from typer.testing import CliRunner
 
 from glsk_o3d import read_skeleton
 
+TOOL = "leaderboard"
+
 SHARES = ("perfect", "topology", "tips_f1", "junctions_f1")
-
-
-@pytest.fixture(scope="module")
-def tool(benchmark):
-    with benchmark("leaderboard") as module:
-        yield module
-
-
-@pytest.fixture(scope="module")
-def parts(tool):
-    names = dict(tables="_leaderboard", runs="_runs", peers="_peers")
-    return SimpleNamespace(**{name: sys.modules[module] for name, module in names.items()})
 
 
 def row(shape="tubes_100", variant="clean", **values):
@@ -36,13 +24,10 @@ def row(shape="tubes_100", variant="clean", **values):
     return facts | found | dict(error=0.1, inside=1.0, completeness=1.0, ends=0.2, length=1.0) | values
 
 
-def failed(reason, **names):
-    return row(**names) | Scores.of_failure(reason).as_dict()
-
-
 def entries(parts, **rows):
     return [
-        parts.tables.Entry(Results("v1", name, True, here), dict(hours=1.5, commit="c")) for name, here in rows.items()
+        parts.leaderboard.Entry(Results("v1", name, True, here), dict(hours=1.5, commit="c"))
+        for name, here in rows.items()
     ]
 
 
@@ -53,55 +38,34 @@ class TestTables:
         better = [row(it, error=0.1, topology=0.0, ends=0.1) for it in shapes]
         now_and_then = [row(it, error=0.1 if i % 3 else 0.35) for i, it in enumerate(shapes)]
         hardly = [row(it, error=0.1999) for it in shapes]
-        found = parts.tables.worse(entries(parts, default=ours, cgal=better, pygel=now_and_then, thinning=hardly))
-        lines = parts.tables.losses(found)[2]
+        found = parts.leaderboard.worse(entries(parts, default=ours, cgal=better, pygel=now_and_then, thinning=hardly))
+        lines = parts.leaderboard.losses(found)[2]
         assert [line[0] for line in lines] == ["all", "clean", "tubes"]
         assert lines[0][1:] == ["12", "error", "CGAL of wrap", "0.100", "0.200", "-0.100 [-0.100, -0.100]"]
         _, low, high = found[1].difference
         assert found[1][:4] == ("all", "pygel", "error", 12)
         assert low < -0.017 < 0 < high
-        assert parts.tables.unclear(found)[2] == [
+        assert parts.leaderboard.unclear(found)[2] == [
             ["error", "PyGEL3D of coarser wrap", "all (-0.017), clean (-0.017), tubes (-0.017)"]
         ]
-
-    def test_overview_is_sorted_and_has_seconds(self, parts):
-        good, bad = [row(), row("trees_100")], [failed("gone"), row("trees_100", perfect=0.0, error=0.4)]
-        rows = leaderboard(entry.results for entry in entries(parts, cgal=bad, default=good)).entries
-        title, header, lines = parts.tables.overview(rows, {"cgal": dict(cpu=2.345)})
-        assert title.startswith("2 clouds")
-        assert [line[0] for line in lines] == ["`default`", "CGAL"]
-        cells = dict(zip(header, lines[1], strict=True))
-        assert cells["perfect"].startswith("0.00")
-        assert cells["topology"].startswith("0.50")
-        assert (cells["failures"], cells["CPU s"], cells["takes"]) == ("1", "2.35", "wrap")
-        assert cells["error"].startswith("0.400")  # of the answer alone
 
 
 class TestKept:
     def test_scores_are_written_packed_and_read(self, parts, monkeypatch, tmp_path):
-        monkeypatch.setattr(parts.tables, "KEPT", tmp_path)
+        monkeypatch.setattr(parts.leaderboard, "KEPT", tmp_path)
         results = Results("v1", "default", True, [row(error=0.123456, seconds=7200.0)])
-        first = parts.tables.keep_scores(results, dict(limit=60.0))
+        first = parts.leaderboard.keep_scores(results, dict(limit=60.0))
         assert first == tmp_path / "v1" / "default.json.gz"
-        assert parts.tables.kept("v2") == []
-        (entry,) = parts.tables.kept("v1")
+        assert parts.leaderboard.kept("v2") == []
+        (entry,) = parts.leaderboard.kept("v1")
         assert entry.results.rows[0]["error"] == 0.1235
         assert (entry.tool, entry.made) == ("default", dict(limit=60.0, hours=2.0))
-        assert first.read_bytes() == parts.tables.keep_scores(results, dict(limit=60.0)).read_bytes()
-
-    def test_those_of_the_package_are_whole(self, parts):
-        found = parts.tables.kept("v1")
-        assert {"default", "wen2024"} <= {entry.tool for entry in found}
-        clouds = {(each["shape"], each["variant"]) for each in found[0].results.rows}
-        for entry in found:
-            assert entry.results.whole
-            assert {(each["shape"], each["variant"]) for each in entry.results.rows} == clouds
-        assert len(clouds) == 779
+        assert first.read_bytes() == parts.leaderboard.keep_scores(results, dict(limit=60.0)).read_bytes()
 
     def test_the_pages_have_what_is_kept(self, tool, parts, root):
         pages = "".join((root / name).read_text(encoding="utf-8") for name in ("README.md", "docs/comparison.md"))
         for version in tool.PARTS:
-            found = parts.tables.kept(version)
+            found = parts.leaderboard.kept(version)
             rows = leaderboard(entry.results for entry in found).entries if found else []
             for name, text in tool.pieces(version, found, rows).items():
                 there = re.search(rf"<!-- {name} -->\n(.*?)<!-- end -->", pages, re.S)[1].strip()
@@ -112,7 +76,7 @@ class TestKept:
 class TestCommands:
     def test_run_keeps_the_scores_and_goes_on(self, tool, parts, call, small, tmp_path, monkeypatch):
         monkeypatch.setattr(tool, "make", lambda place, version, jobs: read_folder(place))
-        monkeypatch.setattr(parts.tables, "KEPT", tmp_path)
+        monkeypatch.setattr(parts.leaderboard, "KEPT", tmp_path)
         assert "default.json.gz: 0 failures" in call("run", tmp_path, "--tool", "default", "--jobs", 2)
         rows = read_results(tmp_path / "v1" / "default.json.gz").rows
         assert len(rows) == 7
@@ -141,13 +105,13 @@ class TestCommands:
         assert call("page").split() == [word for name in tool.PARTS["v1"] for word in ("of", name)]
 
     def test_repeat_keeps_how_far_answers_are_apart(self, tool, parts, call, rods, tmp_path, monkeypatch):
-        monkeypatch.setattr(parts.tables, "KEPT", tmp_path)
+        monkeypatch.setattr(parts.leaderboard, "KEPT", tmp_path)
         words = ("--tool", "default", "--version", "v1", "--draws", 2)
         assert "repeat_things.json.gz: default: moved 0." in call("repeat", tmp_path, *words)
         assert len([*tmp_path.glob("repeat_things/default/*.npz")]) == 12
-        (found,) = parts.tables.repeats("v1", "things")
+        (found,) = parts.leaderboard.repeats("v1", "things")
         assert [each["draws"] for each in found.rows] == [2] * 6
-        _, header, (line,) = parts.tables.repeated([found])
+        _, header, (line,) = parts.leaderboard.repeated([found])
         cells = dict(zip(header, line, strict=True))
         assert (cells[""], cells["loops"], cells["failures"]) == ("`default`", "1.00 [1.00, 1.00]", "0")
 

@@ -2,9 +2,7 @@
 
 import json
 import math
-import sys
 from itertools import count
-from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,106 +11,31 @@ from glsk_o3d import Contractor, Skeleton, pipelines
 from glsk_o3d.numerics.cores import cores
 from glsk_o3d.samples import sauropod
 
-
-@pytest.fixture(scope="module")
-def tool(benchmark):
-    with benchmark("speed") as module:
-        yield module
-
-
-@pytest.fixture(scope="module")
-def parts(tool):
-    """The modules that it is made of, by their names."""
-    return SimpleNamespace(**{it: sys.modules[f"_{it}"] for it in ("stages", "figures", "large", "runs", "tables")})
-
-
-@pytest.fixture(scope="module")
-def stopwatch(tool):
-    return sys.modules["_stopwatch"]
+TOOL = "speed"
 
 
 @pytest.fixture
-def call(call, stopwatch, monkeypatch):
+def call(call, parts, monkeypatch):
     """Run a command, small clouds only as often as asked for; gives what it printed."""
-    monkeypatch.setattr(stopwatch, "LEAST", 0.0)
+    monkeypatch.setattr(parts.stopwatch, "LEAST", 0.0)
     return call
 
 
-@pytest.fixture
-def played(stopwatch, monkeypatch):
-    """A module of the package whose functions take a time that they say; gives its functions, and the clock."""
-    clock = SimpleNamespace(now=0.0)
-    monkeypatch.setattr(stopwatch, "_clocks", lambda: (clock.now, 10 * clock.now))
-    module = ModuleType("glsk_o3d.played")
-    monkeypatch.setitem(sys.modules, module.__name__, module)
-
-    def spend(seconds):
-        clock.now += seconds
-
-    def inner(fail=False):
-        spend(3)
-        if fail:
-            raise ValueError("no")
-
-    def outer(fail=False):
-        spend(1)
-        module.inner(fail)
-        spend(2)
-        return "done"
-
-    vars(module).update(outer=outer, inner=inner)
-    return module, spend
-
-
-def shares(watch):
-    return {name: (share.calls, share.cpu) for name, share in watch.shares.items() if share.cpu}
-
-
 class TestStopwatch:
-    @pytest.mark.parametrize(
-        ("open_", "after", "expected"),
-        [
-            (True, None, {"all": (1, 3.0), "part": (2, 6.0), "rest": (0, 0.5)}),  # what is inside counts for itself
-            (False, None, {"all": (1, 6.0), "part": (1, 3.0), "rest": (0, 0.5)}),
-            (True, ("all", "part"), {"all": (1, 1.0), "part": (2, 6.0), "after": (1, 2.0), "rest": (0, 0.5)}),
-        ],
-    )
-    def test_stages_in_stages(self, stopwatch, played, open_, after, expected):
-        module, spend = played
-        stages = dict(all=stopwatch.Stage("played:outer", open=open_), part=stopwatch.Stage("played:inner"))
-        if after:
-            stages["after"] = stopwatch.Stage(after=after)
-        with stopwatch.Stopwatch(stages) as watch:
-            spend(0.5)
-            assert module.outer() == "done"
-            module.inner()
-        assert shares(watch) == expected
-        assert (watch.cpu, watch.wall) == (9.5, 95.0)
-
-    def test_everything_is_as_before_also_after_an_error(self, stopwatch, played):
-        module, _ = played
-        originals = dict(vars(module))
-        stages = dict(all=stopwatch.Stage("played:outer", open=True), part=stopwatch.Stage("played:inner"))
-        watch = stopwatch.Stopwatch(stages)
-        with pytest.raises(ValueError, match="no"), watch:
-            module.outer(fail=True)
-        assert vars(module) == originals
-        assert shares(watch) == {"all": (1, 1.0), "part": (1, 3.0)}
-
-    def test_the_default_pipeline_goes_through_every_stage(self, stopwatch, monkeypatch):
+    def test_the_default_pipeline_goes_through_every_stage(self, parts, monkeypatch):
         points = sauropod(2400, noise=0.01).points
         pipelines.default()(points)  # so that nothing is imported below
         ticks = count()
-        monkeypatch.setattr(stopwatch, "_clocks", lambda: (next(ticks), 0.0))
-        with stopwatch.Stopwatch(stopwatch.STAGES) as watch:
+        monkeypatch.setattr(parts.stopwatch, "_clocks", lambda: (next(ticks), 0.0))
+        with parts.stopwatch.Stopwatch(parts.stopwatch.STAGES) as watch:
             skeleton = pipelines.default()(points)
-        calls = {name: share.calls for name, share in watch.shares.items() if name != stopwatch.REST}
+        calls = {name: share.calls for name, share in watch.shares.items() if name != parts.stopwatch.REST}
         assert min(calls.values()) > 0, calls
         assert calls["Laplacian"] == len(skeleton.report.iterations) == calls["refinement of the solve"]
         assert all(share.cpu > 0 for share in watch.shares.values())
         assert watch.cpu == next(ticks) - 1  # nothing is lost, nothing counts twice
-        shown = [stage for stages, _ in stopwatch.SHARES.values() for stage in stages]
-        assert sorted(shown) == sorted([*stopwatch.STAGES, stopwatch.REST])
+        shown = [stage for stages, _ in parts.stopwatch.SHARES.values() for stage in stages]
+        assert sorted(shown) == sorted([*parts.stopwatch.STAGES, parts.stopwatch.REST])
 
 
 class TestArithmetic:

@@ -1,43 +1,32 @@
 """The benchmark of trees: its clouds, its scores, the volume of its shapes, and its commands on a few trees."""
 
 import json
-import sys
 
 import numpy as np
 import pytest
 from scipy.io import savemat
 from typer import BadParameter
 
-from glsk_o3d import samples
 from glsk_o3d.samples import Sample
 
-
-@pytest.fixture(scope="module")
-def tool(benchmark):
-    with benchmark("trees") as module:
-        yield module
-
-
-@pytest.fixture(scope="module")
-def parts(tool):
-    return sys.modules["_trees"]
+TOOL = "trees"
 
 
 class TestClouds:
     def test_volume_of_two_balls_with_a_cone_between_and_of_overlaps(self, parts):
         capsule = Sample(np.zeros((1, 3)), np.array([[0, 0, 0], [2.0, 0, 0]]), np.array([[0, 1]]), np.ones(2), "one")
         expected = np.pi * (2 + 4 / 3)
-        assert parts.volume(capsule, 400_000) == pytest.approx(expected, rel=0.01)
+        assert parts.trees.volume(capsule, 400_000) == pytest.approx(expected, rel=0.01)
         twice = Sample(capsule.points, capsule.nodes, np.array([[0, 1], [0, 1]]), capsule.radii, "twice")
-        assert parts.volume(twice, 400_000) == pytest.approx(expected, rel=0.01)
+        assert parts.trees.volume(twice, 400_000) == pytest.approx(expected, rel=0.01)
 
 
 class TestScores:
     def test_half_of_a_line(self, parts):
         """Its diagonal is 1: all of the half is right, and half of the line is there."""
-        whole = parts.skeleton_of(np.array([[0, 0, 0], [1.0, 0, 0]]), np.array([[0, 1]]))
-        half = parts.skeleton_of(np.array([[0, 0, 0], [0.5, 0, 0]]), np.array([[0, 1]]))
-        found = parts.score(np.array([[0, 0, 0], [1.0, 0, 0]]), whole, half)
+        whole = parts.trees.skeleton_of(np.array([[0, 0, 0], [1.0, 0, 0]]), np.array([[0, 1]]))
+        half = parts.trees.skeleton_of(np.array([[0, 0, 0], [0.5, 0, 0]]), np.array([[0, 1]]))
+        found = parts.trees.score(np.array([[0, 0, 0], [1.0, 0, 0]]), whole, half)
         assert found["precision"] == 1
         assert found["recall"] == pytest.approx(0.51, abs=0.003)
         assert found["completeness"] == pytest.approx(100 / 8, rel=0.01)
@@ -81,7 +70,7 @@ class TestModels:
         return written(path, names, columns)
 
     def test_measures_are_those_of_the_cylinders(self, parts, model):
-        found = parts.read_cylinder_model(model)
+        found = parts.trees.read_cylinder_model(model)
         assert found.height == pytest.approx(4)
         assert found.stem_diameter == pytest.approx(0.4)
         assert found.volume == pytest.approx(np.pi * (0.04 * 2 + 0.0225 * 2 + 0.01 * 2.5))
@@ -90,12 +79,12 @@ class TestModels:
 
     def test_other_tables_are_named(self, parts, tmp_path):
         with pytest.raises(BadParameter, match="columns of TreeQSM, SimpleForest, aRchi; there are a, b"):
-            parts.read_cylinder_model(written(tmp_path / "no.csv", ["a", "b"], [[1.0], [2.0]]))
+            parts.trees.read_cylinder_model(written(tmp_path / "no.csv", ["a", "b"], [[1.0], [2.0]]))
         with pytest.raises(BadParameter, match="3 names stand above 1 columns"):
-            parts.read_cylinder_model(written(tmp_path / "torn.csv", ["a", "b", "c"], [[1.0]]))
+            parts.trees.read_cylinder_model(written(tmp_path / "torn.csv", ["a", "b", "c"], [[1.0]]))
         (tmp_path / "ours.txt").write_text("# a tree of treetools\nx,y,z\n1,2,3, 4,5,6\n")
         with pytest.raises(BadParameter, match=r"ours\.txt: no table: its lines have different numbers of columns"):
-            parts.read_cylinder_model(tmp_path / "ours.txt")
+            parts.trees.read_cylinder_model(tmp_path / "ours.txt")
 
 
 class TestCommands:
@@ -122,16 +111,7 @@ class TestCommands:
         assert [(row["seeds"], row["tree"]) for row in rows] == [("chosen", 0), ("other", 100)]
         assert all(abs(row["stem_diameter"] / row["true_diameter"] - 1) < 0.03 for row in rows)
         assert "other seeds, all" in out
-        (_, _, (line, *_)), (_, header, (*_, last)) = parts.stem_tables([rows[0], rows[1] | dict(failure="no")])
+        (_, _, (line, *_)), (_, header, (*_, last)) = parts.trees.stem_tables([rows[0], rows[1] | dict(failure="no")])
         assert line[1:4] == ["1", "1", "1"]
         assert len(last) == len(header)
         assert last[-1] == "no"
-
-    def test_large(self, parts, tmp_path):
-        np.save(tmp_path / "scan.npy", samples.tree(2000, forks=2, cameras=parts.CAMERAS).points)
-        facts = dict(n=2000, pipeline="default, untraced")
-        ((_, header, (line, failed)),) = parts.large_tables(
-            [facts | parts.once(tmp_path / "scan.npy", facts["pipeline"]), facts | dict(failure="ValueError: no")]
-        )
-        assert dict(zip(header, line, strict=True))["traced"] == "0"
-        assert failed == ["default, untraced", "2000", *"-" * 7, "ValueError: no"]
