@@ -8,7 +8,6 @@ from scipy.spatial import cKDTree
 from glsk_o3d import (
     InvalidCloudError,
     InvalidParameterError,
-    LPRReducer,
     OutlierRemover,
     RingBuilder,
     remove_redundant_points,
@@ -73,16 +72,12 @@ def test_duplicates_and_outliers():
     assert 1500 not in remove_redundant_points(far, rings=OutlierRemover() | RingBuilder())[1]
 
 
-def test_parameters():
-    assert len(remove_redundant_points(POINTS, reducer=LPRReducer(phi=1e-12))[1]) > len(KEPT)
-    with pytest.raises(InvalidParameterError, match="phi"):
-        remove_redundant_points(POINTS, reducer=LPRReducer(phi=-1))
-    with pytest.raises(InvalidParameterError, match="reducer"):
-        remove_redundant_points(POINTS, reducer=0)
-    for passes in (0, 1.0, True):
-        with pytest.raises(InvalidParameterError, match="passes"):
-            remove_redundant_points(POINTS, passes=passes)
+@pytest.mark.parametrize(("name", "value"), [("reducer", 0), ("passes", 0), ("passes", 1.0)])
+def test_wrong_parameters(name, value):
+    with pytest.raises(InvalidParameterError, match=name):
+        remove_redundant_points(POINTS, **{name: value})
+
+
+def test_a_mesh_is_no_cloud():
     with pytest.raises(InvalidCloudError):
         remove_redundant_points(o3d.geometry.TriangleMesh.create_sphere())
-    with pytest.raises(InvalidCloudError):
-        remove_redundant_points(np.r_[POINTS, [[np.nan] * 3]])

@@ -13,7 +13,7 @@ TOOL = "fuzz"
 
 
 @pytest.mark.parametrize(
-    ("what", "cases"), [("arrays", 15), ("files", 200), ("lies", 200), ("named", 15), ("skeletons", 40)]
+    ("what", "cases"), [("arrays", 8), ("files", 80), ("lies", 80), ("named", 15), ("skeletons", 20)]
 )
 def test_nothing_is_found(call, what, cases):
     told = call(what, "--runs", cases, "--seed", 1)

@@ -50,21 +50,18 @@ def test_pythons_are_the_same_everywhere(root, pyproject):
 
 
 def test_release_notes(root, tmp_path):
-    (tmp_path / "scripts").mkdir()
-    (tmp_path / "glsk_o3d").mkdir()
-    script = tmp_path / "scripts" / "release_notes.py"
+    for name in ("scripts", "glsk_o3d"):
+        (tmp_path / name).mkdir()
+    script, changes = tmp_path / "scripts" / "release_notes.py", tmp_path / "CHANGELOG.md"
     script.write_text((root / "scripts" / "release_notes.py").read_text("utf-8"))
     (tmp_path / "glsk_o3d" / "__init__.py").write_text('__version__ = "0.2.0"\n')
     (tmp_path / "CITATION.cff").write_text("cff-version: 1.2.0\nversion: 0.2.0\n")
-    changes = tmp_path / "CHANGELOG.md"
-
-    def notes(tag):
-        return subprocess.run([sys.executable, str(script), tag], capture_output=True, text=True)
-
-    changes.write_text("# Changelog\n\n## [0.2.0] - unreleased\n\n- New.\n\n## [0.1.0] - 2026-01-01\n\nOld.\n")
-    assert "CHANGELOG.md: needs a heading" in notes("v0.2.0").stderr
-    changes.write_text(changes.read_text().replace("unreleased", "2026-02-01"))
-    assert notes("v0.2.0").stdout == "- New.\n"
-    done = notes("v0.3.0")
-    assert done.returncode == 1
-    assert "the tag is v0.3.0" in done.stderr
+    for date, tag, said in (
+        ("unreleased", "v0.2.0", "CHANGELOG.md: needs a heading"),
+        ("2026-02-01", "v0.2.0", "- New.\n"),
+        ("2026-02-01", "v0.3.0", "the tag is v0.3.0"),
+    ):
+        changes.write_text(f"# Changelog\n\n## [0.2.0] - {date}\n\n- New.\n\n## [0.1.0] - 2026-01-01\n\nOld.\n")
+        done = subprocess.run([sys.executable, str(script), tag], capture_output=True, text=True)
+        assert said in (done.stderr if done.returncode else done.stdout)
+        assert (done.returncode == 0) == said.startswith("-")

@@ -28,7 +28,6 @@ from glsk_o3d import (
     Skeleton,
     StageError,
     Thinner,
-    Tracer,
     pipelines,
     samples,
     skeletonize,
@@ -227,20 +226,6 @@ def test_options_that_are_none_or_wrong_or_given_twice(options, named, words):
         pipelines.default().with_options(options, **named)
     with pytest.raises(InvalidParameterError, match=words):
         skeletonize(np.zeros((0, 3)), options, **named)
-
-
-@pytest.mark.slow
-def test_skeletonize_takes_options():
-    prepare = Sampler() | OutlierRemover() | Denoiser() | Thinner()
-    rest = Contractor(reducer=LPRReducer()) | Connector() | Refiner() | Tracer()
-    by_hand = (prepare | RingBuilder(k=24) | rest)(POINTS)
-    assert_same(skeletonize(POINTS, k=24), by_hand)
-    assert_same(skeletonize(POINTS, {"RingBuilder.k": 24}), by_hand)
-    assert_same(skeletonize(POINTS, "default", k=24), by_hand)
-    assert_same(skeletonize(POINTS, pipelines.default(), **{"RingBuilder.k": 24}), by_hand)
-    assert_same(skeletonize(POINTS, {"spacing": 1}, k=24), skeletonize(POINTS, spacing=1, k=24))
-    varied = skeletonize(POINTS, "cao2010", **{"Connector.radius": "4%"})
-    assert glsk.from_recipe(varied.report.recipe).stages[3].radius == "4%"
 
 
 # ---- skeletonize

@@ -138,14 +138,6 @@ def test_a_loop_that_is_cut_leaves_no_spurs():
     assert (skeleton.radii > 0).all()
 
 
-def test_limbs_without_a_cloud_stay():
-    """Nobody knows how far they reach."""
-    places = [[0, 0, 0], *(length * np.array(way) for way in ([1, 0, 0], [0, 1, 0], [0, 0, 1]) for length in (1, 2))]
-    edges = [(0, 1), (1, 2), (0, 3), (3, 4), (0, 5), (5, 6)]
-    skeleton = Refiner()(Skeleton(places, edges, np.full(7, 0.1), (), (), ()))
-    assert (len(skeleton.leaves), len(skeleton.junctions)) == (3, 1)
-
-
 def test_the_only_branch_may_go():
     """Nothing is left to ask about then."""
     rng = np.random.default_rng(0)

@@ -81,36 +81,22 @@ def turned(sequence):
 def neighbourhoods(kind, n=300, k=14):
     rng = np.random.default_rng(len(kind))
     cloud = rng.normal(size=(n, k, 2))
-    if kind == "stretched":
-        cloud *= [1, 1e-3]
-    elif kind == "border":
+    if kind == "border":
         cloud[..., 1] = np.abs(cloud[..., 1])
-    elif kind == "corner":
-        cloud = np.abs(cloud)
     elif kind == "graded":
         cloud *= 10 ** rng.uniform(-4, 0, (n, k, 1))
-    elif kind == "arc":
-        angle = rng.uniform(0, 1.7 * np.pi, (n, k))
-        cloud = np.stack([np.cos(angle), np.sin(angle)], -1) * rng.uniform(0.9, 1.1, (n, k, 1))
     elif kind == "thin ring":  # all but cocircular
         cloud /= np.linalg.norm(cloud, axis=2, keepdims=True)
         cloud += 1e-4 * rng.normal(size=cloud.shape)
-    elif kind == "jittered grid":
-        grid = np.stack(np.meshgrid([-2, -1, 0, 1, 2], [-2, -1, 0, 1, 2]), -1).reshape(-1, 2)
-        grid = grid[np.abs(grid).sum(axis=1) > 0]
-        cloud = grid + 1e-3 * rng.normal(size=(n, len(grid), 2))
     return cloud
 
 
-KINDS = ("plain", "stretched", "border", "corner", "graded", "arc", "thin ring", "jittered grid")
-
-
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ["plain", "border", "graded", "thin ring"])
 def test_against_triangulations(kind):
     """Counter-clockwise; a closed ring starts with the nearest neighbour."""
     cloud = neighbourhoods(kind)
     rings, closed = delaunay_star(cloud)
-    assert closed.any() == (kind not in ("border", "corner"))
+    assert closed.any() == (kind != "border")
     for offsets, row, is_closed in zip(cloud, rings.tolist(), closed.tolist(), strict=True):
         ring = [j for j in row if j >= 0]
         assert (links(ring, is_closed), is_closed) == triangulated_star(offsets)
@@ -118,9 +104,6 @@ def test_against_triangulations(kind):
         cross = offsets[ring, 0] * following[:, 1] - offsets[ring, 1] * following[:, 0]
         assert (cross[: None if is_closed else -1] > 0).all()
         assert not is_closed or row[0] == np.argmin((offsets**2).sum(axis=1))
-
-
-# ---- degenerate neighbourhoods, by hand
 
 
 # ---- degenerate neighbourhoods, by the thousand: small integers are often collinear, cocircular, doubled

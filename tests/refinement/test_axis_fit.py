@@ -241,11 +241,6 @@ def test_detached_vertices_are_pulled_back_to_the_reach_of_half_a_tube(random_sk
 # ---- radii
 
 
-@pytest.mark.parametrize("arc", [2 * np.pi, np.pi])
-def test_radii_of_exact_tubes_are_theirs(arc):
-    np.testing.assert_allclose(fit_axis(tube(arc=arc), 1)[2], R, rtol=1e-9)
-
-
 def test_radii_of_a_cone_are_those_of_the_balls_in_it():
     """The distance of its points is more.
 
