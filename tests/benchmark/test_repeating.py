@@ -131,21 +131,13 @@ class TestSamples:
     def test_wrong_meshes(self, meshes, tmp_path):
         with pytest.raises(FileNotFoundError, match="has no meshes"):
             sample(tmp_path / "made", tmp_path / "none")
-        for text in (
-            "",
-            "{}",
-            '{"meshes": [{"name": "box", "ends": 2}]}',
-            '{"meshes": [{"name": "box", "loops": -1}]}',
-        ):
+        for text in ("", '{"meshes": [{"name": "box", "loops": -1}]}'):
             (meshes / "manifest.json").write_text(text)
             with pytest.raises(FileFormatError, match=r"manifest\.json: is damaged"):
                 sample(tmp_path / "made", meshes)
         (meshes / "manifest.json").unlink()
         (meshes / "box.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n")
         with pytest.raises(InvalidParameterError, match="'box' is no plain name, or that of two meshes"):
-            sample(tmp_path / "made", meshes)
-        (meshes / "box.off").rename(meshes / "a.off")
-        with pytest.raises(FileFormatError, match=r"a\.off: its triangles have no area"):
             sample(tmp_path / "made", meshes)
 
 
