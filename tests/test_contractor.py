@@ -251,16 +251,6 @@ def test_thrown_points_are_held(built, monkeypatch):
     np.testing.assert_allclose(state.positions[thrown], built.positions[thrown], atol=1e-4)
 
 
-@pytest.mark.parametrize("floor", [0, 3])
-def test_attraction_has_a_floor_and_a_cap(built, monkeypatch, floor):
-    size = built.ring_size0.copy()
-    size[:4] *= [4, 0.25, 1e-9, 0]
-    capture = Capture(monkeypatch)
-    Contractor(max_iterations=1, min_attraction=floor, max_attraction=500.0)(replace(built, ring_size=size))
-    ((_, weight),) = capture.calls
-    np.testing.assert_allclose(weight[:5], np.maximum([0.25, 4, 500, 500, 1], floor))
-
-
 # ---- what is a line already
 
 

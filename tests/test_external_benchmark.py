@@ -55,17 +55,6 @@ def test_branches_of_trees_are_welded_where_they_begin(call, trees, tmp_path):
     assert "none of 1 shapes is called tree_large_*" in wrong
 
 
-def test_bad_trees_are_named(call, trees, tmp_path):
-    axes = {9: "v 0 0 0\nv 1 0 0\n", 10: "v 0 0 zero\nv 1 0 0\nl 1 2\n", 11: "v 0 0 0\nv 0 99 0\nl 1 2\n"}
-    for number, text in axes.items():
-        (trees / f"scan_skel/tree_small_{number}.obj").write_text(text)
-        write_ply(trees / f"scan_ply/tree_small_{number}_res_50.ply", FORK.points)
-    out = call("trees", trees, "-o", tmp_path / "bench")
-    for said in ("1 shapes, 2 clouds", "small_9.obj: has no lines", "not a valid .obj", "are they of one version"):
-        assert said in out
-    assert list(read_folder(tmp_path / "bench").shapes) == ["tree_small_7"]
-
-
 @pytest.fixture
 def plants(tmp_path):
     """Two plants, one with labels."""
@@ -93,14 +82,12 @@ def test_graphs_of_plants_and_clouds_of_both_kinds(call, plants, tmp_path):
         np.testing.assert_allclose(np.median(made.truth(name).radii), 50 * np.median(FORK.radii), rtol=0.1)
 
 
-@pytest.mark.parametrize("text", ["", "v 0 0 0\nv 1 1 1\n", "v 0 0 0\nv 1 1 1\ne 0 2\n", "v 0 0 a\ne 0 0\n"])
-def test_a_bad_graph_is_named(call, plants, tmp_path, text):
-    (plants / "maize/03-13.graph.txt").write_text(text)
+def test_a_bad_graph_is_named(call, plants, tmp_path):
+    (plants / "maize/03-13.graph.txt").write_text("v 0 0 0\nv 1 1 1\ne 0 2\n")
     (plants / "tomato/03-13.xyz").unlink()
     out = call("plants", plants, "-o", tmp_path / "bench", code=1)
-    assert "0 shapes, 0 clouds" in out
-    assert "maize/03-13.graph.txt: not a valid graph" in out
-    assert "tomato/03-13.ply or .xyz: no such cloud" in out
+    for said in ("0 shapes, 0 clouds", "03-13.graph.txt: not a valid graph", "03-13.ply or .xyz: no such cloud"):
+        assert said in out
 
 
 @pytest.fixture
@@ -131,9 +118,7 @@ def test_clouds_of_vessels_are_drawn_of_the_round_cones(call, vessels, tmp_path)
     [
         ("1 0 0 0 0 1 -1\n2 0 9 0 0 0 1\n", "1 of 2 nodes have no radius above 0"),
         ("1 0 0 0 0 1 -1\n2 0 9e6 0 0 1 1\n", "more than 300000"),
-        ("1 0 0 0 0 1 -1\n2 0 0 0 0 1 1\n", "no edges"),
         ("rubbish\n", "not a valid .swc"),
-        ("", "the file is empty"),
     ],
 )
 def test_a_bad_file_of_vessels_is_named(parts, tmp_path, text, said):
