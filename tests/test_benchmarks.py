@@ -5,7 +5,6 @@ import re
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from itertools import chain
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -101,16 +100,6 @@ class TestArithmetic:
         page = (root / "docs" / "paper.md").read_text(encoding="utf-8")
         assert f"<!-- worth -->\n\n{tool.worth_text()}" in page
 
-    def test_feet_on_a_square(self, parts):
-        nodes = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]])
-        edges = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
-        distance, edge, part = parts.stability.feet(np.array([[0.5, 0.1, 0], [3, 2.0, 0], [-1, 0.5, 0]]), nodes, edges)
-        np.testing.assert_allclose(distance, [0.1, 1, 1])
-        np.testing.assert_array_equal(edge[[0, 2]], [0, 3])
-        np.testing.assert_allclose(part[[0, 2]], [0.25, 0.75])
-        axis = SimpleNamespace(nodes=nodes[:2], edges=edges[:1], radii=np.r_[1.0, 2])
-        np.testing.assert_allclose(parts.stability.local_radius(axis, np.array([[0.5, 3, 0], [5, 0, 0]])), [1.25, 2])
-
 
 def test_all_ideas_off_are_the_publications(parts):
     off = {name: setting.split() for name, setting in parts.accuracy.IDEAS.items()}
@@ -147,17 +136,6 @@ class TestCommands:
         same = call("compare", saved[0], saved[0], "--markdown")
         assert "| all | `default` | 7 | 1.00 → 1.00 | +0.00 [+0.00, +0.00] |" in same
 
-    def test_a_shape_that_fails_is_a_row(self, call, tmp_path):
-        ring = torus(512)
-        axis = dict(nodes=ring.nodes, edges=ring.edges, radii=ring.radii)
-        np.savez(tmp_path / "good.npz", **axis, clean_512=ring.points)
-        np.savez(tmp_path / "few.npz", **axis, clean_512=ring.points[:3])
-        (tmp_path / "broken.npz").write_text("this is no archive")
-        printed = call("truth", tmp_path, "--variant", "clean_512", "--pipeline", "default", "--markdown", "--jobs", 0)
-        assert "| clean_512 | `default` | 3 | 0.33 [0.00, 1.00] |" in printed
-        assert "few (InvalidCloudError: 3 finite points" in printed
-        assert "broken (" in printed
-
     def test_a_page_and_its_pictures(self, tool, call, tmp_path, monkeypatch):
         saved = [tmp_path / f"{command}.json" for command in ("truth", "ablation", "stop")]
         effects = tmp_path / "effects.md"
@@ -190,17 +168,9 @@ class TestCommands:
         assert found["moves"][0] < 0.5
         assert "| mean | " in call("mass", *FEW, "--markdown")
 
-    @pytest.mark.parametrize(
-        "wrong",
-        [
-            ("truth", "--builtin", "--shapes", "teapot"),
-            ("truth", "--builtin", "--set", "Refiner.magic=1"),
-            ("ablation", "--builtin", "--idea", "magic"),
-            ("mass", "--builtin", "-o", "no_such_folder/out.json"),
-        ],
-    )
-    def test_wrong_usage_is_found_at_once(self, call, wrong):
-        assert "Invalid value" in call(*wrong, code=2)
+    def test_wrong_usage_is_found_at_once(self, call):
+        for wrong in (("--shapes", "teapot"), ("--set", "Refiner.magic=1"), ("-o", "no_such_folder/out.json")):
+            assert "Invalid value" in call("truth", "--builtin", *wrong, code=2)
 
 
 @pytest.mark.parametrize(

@@ -19,12 +19,6 @@ def ring(n, turn=0.0):
     return np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
 
 
-def tubes(*lines):
-    """Straight axes of radius 0.1, each from end to end."""
-    nodes = np.array(lines, float).reshape(-1, 3)
-    return Truth(nodes, np.arange(len(nodes)).reshape(-1, 2), np.full(len(nodes), 0.1))
-
-
 class TestLabels:
     def test_the_loop_of_a_ring_is_a_handle_and_one_that_only_goes_to_and_fro_is_none(self, parts):
         axis = Truth(ring(40), np.column_stack([np.arange(40), np.roll(np.arange(40), -1)]), np.full(40, 0.1))
@@ -32,15 +26,6 @@ class TestLabels:
         assert placed.is_handle(np.arange(17))
         assert placed.is_handle(np.arange(17)[::-1])
         assert not placed.is_handle(np.array([*range(10), *range(8, 0, -1)]))
-
-    def test_a_false_edge_between_parallel_tubes_crosses_air(self, parts):
-        axis = tubes([[0, 0, 0], [2, 0, 0]], [[0, 0.3, 0], [2, 0.3, 0]])
-        x = np.linspace(0, 1, 21)
-        path = np.concatenate([np.column_stack([x, 0 * x, 0 * x]), np.column_stack([1 + x, 0 * x + 0.3, 0 * x])])
-        placed = parts.questions.Placed(axis, path)
-        near = [placed.crosses_air(np.arange(42), k) for k in range(41)]
-        assert np.flatnonzero(near).tolist() == list(range(20 - parts.questions.NEAR, 21 + parts.questions.NEAR))
-        assert not placed.joined(20, 21)
 
     def test_asks_what_the_refiner_asks(self, parts):
         """Of the same skeletons: what a clean cloud is asked has the probabilities that the report has."""

@@ -113,20 +113,6 @@ def test_clouds_of_vessels_are_drawn_of_the_round_cones(call, vessels, tmp_path)
     assert np.abs(samples.signed_distance(points, truth.nodes, truth.edges, truth.radii)).max() < 1e-4
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("1 0 0 0 0 1 -1\n2 0 9 0 0 0 1\n", "1 of 2 nodes have no radius above 0"),
-        ("1 0 0 0 0 1 -1\n2 0 9e6 0 0 1 1\n", "more than 300000"),
-        ("rubbish\n", "not a valid .swc"),
-    ],
-)
-def test_a_bad_file_of_vessels_is_named(parts, tmp_path, text, said):
-    (tmp_path / "bad.swc").write_text(text)
-    with pytest.raises(Exception, match=rf"bad\.swc: .*{said}"):
-        parts.external.read_axis(tmp_path / "bad.swc")
-
-
 def centrelines():
     """Three lines from one inlet that part at z = 0 and z = 4; the last comes near to the first again later."""
     t = np.linspace(-10, 10, 201)
@@ -135,50 +121,6 @@ def centrelines():
     back = np.where(t < 5, aside, np.maximum(5 - (t - 5), 0.1))
     paths = [(0 * t, 0 * t), (0 * t, -later), (back, 0 * t)]
     return [np.column_stack([x, y, t]) + rng.normal(0, 0.02, (201, 3)) for x, y in paths]
-
-
-def write_vtp(path, nodes=None, triangles=None, lines=(), **arrays):
-    from vtkmodules.util.numpy_support import numpy_to_vtk
-    from vtkmodules.vtkCommonCore import vtkPoints
-    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
-    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
-
-    data, points, cells = vtkPolyData(), vtkPoints(), vtkCellArray()
-    nodes = np.vstack(lines) if nodes is None else nodes
-    points.SetData(numpy_to_vtk(np.ascontiguousarray(nodes), deep=True))
-    data.SetPoints(points)
-    ends = np.cumsum([len(line) for line in lines])[:-1]
-    for cell in np.split(np.arange(len(nodes)), ends) if triangles is None else triangles:
-        cells.InsertNextCell(len(cell), [*map(int, cell)])
-    (data.SetLines if triangles is None else data.SetPolys)(cells)
-    for name, values in arrays.items():
-        array = numpy_to_vtk(values, deep=True)
-        array.SetName(name)
-        data.GetPointData().AddArray(array)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    writer = vtkXMLPolyDataWriter()
-    writer.SetFileName(str(path))
-    writer.SetInputData(data)
-    assert writer.Write()
-
-
-def test_arteries_and_what_is_bad_in_them(call, tmp_path):
-    pytest.importorskip("vtkmodules.vtkIOXML", reason="vtk is not installed")
-    data, lines, radii = tmp_path / "data", centrelines(), np.full(603, 1.0)
-    mesh = o3d.geometry.TriangleMesh.create_cylinder(1.0, 20.0, 30, 20)
-    write_vtp(data / "C1/surface/model.vtp", np.asarray(mesh.vertices), np.asarray(mesh.triangles))
-    for name, facts in (("C1", dict(MaximumInscribedSphereRadius=radii)), ("C2", dict(Radius=radii))):
-        write_vtp(data / name / "morphology/centerlines.vtp", lines=lines, **facts)
-    out = call("vessels", data, "-o", tmp_path / "bench", "--points", 700)
-    assert "1 shapes, 1 clouds" in out
-    assert "C2/morphology/centerlines.vtp: has no lines with the point array MaximumInscribedSphereRadius" in out
-    made = read_folder(tmp_path / "bench")
-    (cloud,) = made.clouds
-    assert (cloud.name, cloud.family) == ("C1_surface", "arteries")
-    points = np.asarray(o3d.io.read_point_cloud(str(cloud.path)).points)
-    assert len(points) == 700
-    assert np.hypot(*points[:, :2].T).max() <= 1 + 1e-6
-    assert shape_of(made, "C1") == (1, 0, 4, 2)
 
 
 def test_lines_are_joined_where_they_part_and_not_where_they_touch(parts):
@@ -191,16 +133,3 @@ def test_lines_are_joined_where_they_part_and_not_where_they_touch(parts):
         assert len(edges) == (degree > 0).sum() - 1  # one tree
         forks.append(np.sort(nodes[degree == 3, 2]))
     np.testing.assert_allclose(forks, [[0.5, 4.5]] * 3, atol=0.3)
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("trees",), "no scan_skel/tree_*.obj"),
-        (("plants",), "no NAME.graph.txt"),
-        (("vessels",), "no NAME.swc"),
-    ],
-)
-def test_nothing_there(call, tmp_path, words, said):
-    assert said in " ".join(call(*words, tmp_path, "-o", tmp_path / "bench", code=2).split())
-    assert not (tmp_path / "bench").exists()

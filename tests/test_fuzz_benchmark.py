@@ -1,9 +1,5 @@
 """The fuzzer: a few of its cases, and that it finds what is there to be found."""
 
-import os
-import signal
-from types import SimpleNamespace
-
 import pytest
 
 from glsk_o3d import Report, Skeleton, skeletonize
@@ -52,22 +48,3 @@ def test_what_is_wrong_is_found(parts):
         spoilt.__dict__.update({**ring.__dict__, **changes})
         assert said in parts.fuzz_arrays.unsound(spoilt, ring.points, 0.05)[0]
     assert parts.fuzz_arrays.unsound(ring, ring.points, 0.05) == []
-
-
-def test_a_process_that_dies_or_hangs_is_a_finding_and_the_others_are_run(tool, monkeypatch):
-    monkeypatch.setattr(tool, "_work", dies_and_hangs)
-    monkeypatch.setattr(tool, "LIMIT_S", 2)
-    outcomes = list(tool.run_cases("files", 0, range(5)))
-    assert [outcome.number for outcome in outcomes] == [*range(5)]
-    found = [outcome.findings for outcome in outcomes]
-    assert found == [[], ["its process died: SIGABRT"], [], ["not done after 2 s"], []]
-
-
-def dies_and_hangs(sender, what, seed, numbers):
-    sender.send(None)
-    for number in numbers:
-        if number == 1:
-            os.kill(os.getpid(), signal.SIGABRT)
-        if number == 3:
-            signal.pause()
-        sender.send(SimpleNamespace(number=number, findings=[]))

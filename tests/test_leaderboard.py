@@ -6,7 +6,6 @@ import signal
 import time
 
 import numpy as np
-import pytest
 from glsk_bench import Results, leaderboard, read_folder, read_results
 from glsk_bench.scoring import Scores
 from typer.testing import CliRunner
@@ -51,17 +50,6 @@ class TestTables:
 
 
 class TestKept:
-    def test_scores_are_written_packed_and_read(self, parts, monkeypatch, tmp_path):
-        monkeypatch.setattr(parts.leaderboard, "KEPT", tmp_path)
-        results = Results("v1", "default", True, [row(error=0.123456, seconds=7200.0)])
-        first = parts.leaderboard.keep_scores(results, dict(limit=60.0))
-        assert first == tmp_path / "v1" / "default.json.gz"
-        assert parts.leaderboard.kept("v2") == []
-        (entry,) = parts.leaderboard.kept("v1")
-        assert entry.results.rows[0]["error"] == 0.1235
-        assert (entry.tool, entry.made) == ("default", dict(limit=60.0, hours=2.0))
-        assert first.read_bytes() == parts.leaderboard.keep_scores(results, dict(limit=60.0)).read_bytes()
-
     def test_the_pages_have_what_is_kept(self, tool, parts, root):
         pages = "".join((root / name).read_text(encoding="utf-8") for name in ("README.md", "docs/comparison.md"))
         for version in tool.PARTS:
@@ -114,18 +102,6 @@ class TestCommands:
         _, header, (line,) = parts.leaderboard.repeated([found])
         cells = dict(zip(header, line, strict=True))
         assert (cells[""], cells["loops"], cells["failures"]) == ("`default`", "1.00 [1.00, 1.00]", "0")
-
-    @pytest.mark.parametrize(
-        "wrong",
-        [
-            ("run", "d", "--tool", "magic"),
-            ("seconds", "--tool", "magic"),
-            ("page", "no_such_page.md"),
-            ("picture", "d", "no_such_folder/p.png"),
-        ],
-    )
-    def test_wrong_usage_is_found_at_once(self, call, wrong):
-        assert "Invalid value" in call(*wrong, code=2)
 
 
 class TestTools:

@@ -5,7 +5,6 @@ import json
 import numpy as np
 import pytest
 from scipy.io import savemat
-from typer import BadParameter
 
 from glsk_o3d.samples import Sample
 
@@ -47,13 +46,10 @@ def written(path, names, columns, between=","):
 
 
 class TestModels:
-    @pytest.fixture(params=("TreeQSM", "TreeQSM text", "TreeQSM matrix", "SimpleForest", "aRchi"))
+    @pytest.fixture(params=("TreeQSM text", "TreeQSM matrix", "SimpleForest", "aRchi"))
     def model(self, request, tmp_path):
         """The three cylinders as programs write them."""
         path, ends = tmp_path / "model.txt", [f"{end}{axis}" for end in ("start", "end") for axis in "XYZ"]
-        if request.param == "TreeQSM":
-            names = ["radius", "length", *(f"{it}.{axis}" for it in ("start", "axis") for axis in "xyz"), "BranchOrder"]
-            return written(path, names, [RADIUS, LENGTH, START, AXIS, ORDER])
         if request.param == "TreeQSM text":
             names = ["radius (m)", "length (m)", "start_point", "axis_direction", "parent", "extension", "branch"]
             columns = [RADIUS, LENGTH, START, AXIS, PARENT, [2, 0, 0], [1, 1, 2], ORDER, [1, 2, 1], [0, 0, 0]]
@@ -76,15 +72,6 @@ class TestModels:
         assert found.volume == pytest.approx(np.pi * (0.04 * 2 + 0.0225 * 2 + 0.01 * 2.5))
         assert found.order.tolist() == [0, 0, 1]
         np.testing.assert_allclose(found.end, END)
-
-    def test_other_tables_are_named(self, parts, tmp_path):
-        with pytest.raises(BadParameter, match="columns of TreeQSM, SimpleForest, aRchi; there are a, b"):
-            parts.trees.read_cylinder_model(written(tmp_path / "no.csv", ["a", "b"], [[1.0], [2.0]]))
-        with pytest.raises(BadParameter, match="3 names stand above 1 columns"):
-            parts.trees.read_cylinder_model(written(tmp_path / "torn.csv", ["a", "b", "c"], [[1.0]]))
-        (tmp_path / "ours.txt").write_text("# a tree of treetools\nx,y,z\n1,2,3, 4,5,6\n")
-        with pytest.raises(BadParameter, match=r"ours\.txt: no table: its lines have different numbers of columns"):
-            parts.trees.read_cylinder_model(tmp_path / "ours.txt")
 
 
 class TestCommands:
