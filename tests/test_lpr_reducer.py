@@ -85,6 +85,13 @@ def test_matching_is_greedy(pairs):
     assert chosen == sorted(chosen)
 
 
+def test_mending_leaves_fewer_points_that_nothing_surrounds():
+    broken = [
+        (contracted(CLOUDS["torus"], 6, LPRReducer(mend_rings=mend)).rings.sizes < 3).sum() for mend in (False, True)
+    ]
+    assert broken[1] < broken[0]
+
+
 # ---- the pass
 
 

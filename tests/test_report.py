@@ -1,5 +1,6 @@
 """Report, IterationRecord and Decision."""
 
+import contextlib
 import dataclasses
 import json
 import re
@@ -34,6 +35,16 @@ def test_survives_json(report):
     assert isinstance(again.iterations, tuple)
     assert again.iterations[1].iteration == 2
     assert Report.from_dict({}) == Report()
+
+
+@pytest.mark.parametrize("name", [field.name for field in dataclasses.fields(Report)])
+def test_an_entry_of_another_type_is_refused_or_means_the_same(report, name):
+    """Else it would be found out where it is printed."""
+    for value in (None, "x", -0.5, True, 10**400, ["x", 2], [[1]], {}, {"a": []}):
+        with contextlib.suppress(ValueError, TypeError, AttributeError):  # each of which a reader says in a sentence
+            again = getattr(Report.from_dict({**report.to_dict(), name: value}), name)
+            assert type(again) is type(getattr(report, name))
+            assert json.dumps(again) in (json.dumps(value), "{}", "[]")
 
 
 def test_places_on_a_map_keep_their_digits():

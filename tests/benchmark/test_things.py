@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from glsk_bench.clouds import cloud, coverage
 from glsk_bench.shapes import FAMILIES, Thing
-from glsk_bench.shapes.curves import generator, polygon
+from glsk_bench.shapes.curves import generator
 from glsk_bench.shapes.things.fairness import fault_of
 from glsk_bench.shapes.things.field import distance, surface_of
 from glsk_bench.shapes.things.lines import X, Y
@@ -130,9 +130,8 @@ def test_distances_to_a_rod(steps, blend):
 @pytest.mark.parametrize(
     ("ends", "area"), [(("flat", "flat"), 2 * np.pi * 0.1 * 1.1), (ROUND_ENDS, 2 * np.pi * 0.1 * 1.2)]
 )
-@pytest.mark.parametrize("blend", [0, 0.01])
-def test_points_are_uniform_by_area(ends, area, blend):
-    found = surface_of(rod(ends, blend=blend), 20_000, generator("rod"))
+def test_points_are_uniform_by_area(ends, area):
+    found = surface_of(rod(ends), 20_000, generator("rod"))
     assert found.area == pytest.approx(area, rel=0.03)
     side = np.abs(found.points[:, 0] - 0.5) < 0.49
     assert side.mean() == pytest.approx(2 * np.pi * 0.1 * 0.98 / area, abs=0.02)
@@ -157,18 +156,10 @@ def fork(length):
     return solid
 
 
-def plate(hole):
-    solid = Solid()
-    solid.ring(polygon(48, radius=0.3), 0.05, 0.1, 8)
-    solid.openings = [hole]
-    return solid
-
-
 @pytest.mark.parametrize(
     ("word", "bad", "good", "spacing"),
     [
         ("thin", rod(ROUND_ENDS, radius=0.0119), rod(ROUND_ENDS, radius=0.0121), 0.01),
-        ("narrow", plate(0.0249), plate(0.0251), 0.01),
         ("stub", fork(0.274), fork(0.276), 0.01),
         ("holes", two(-0.02), two(0.1), 0.01),
         ("gap", two(0.04), two(0.06), 0.01),

@@ -60,6 +60,15 @@ def test_an_end_stops_where_its_limb_does(refine, cap, where, stop, hook):
     np.testing.assert_allclose(found, [LENGTH + where * R, 0, 0], atol=0.15 * R)
 
 
+@pytest.mark.parametrize("cap", ["flat", "round"])
+def test_half_a_limb_is_enough(refine, cap):
+    """Seen from one side."""
+    points, normals = limb(cap)
+    seen = points[:, 1] > 0
+    found = tip(refine(fork(points[seen], normals[seen], LENGTH, 1), recentre=3))
+    np.testing.assert_allclose(found, [LENGTH - (cap == "flat") * R / 2, 0, 0], atol=0.2 * R)
+
+
 def test_new_vertices_are_like_those_behind(refine):
     """As far apart and as thick; every point of a vertex that was cut has the nearest one of the end."""
     found = refine(fork(*limb("flat"), LENGTH, 1), recentre=3)

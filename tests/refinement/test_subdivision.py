@@ -28,6 +28,10 @@ def test_edges_are_as_long_as_a_share_of_the_mean_radius_and_have_eight_points_e
     np.testing.assert_array_equal(np.sort(skeleton.degree), [1, 1] + [2] * (pieces - 1))
 
 
+def test_tiny_radii_make_no_endless_subdivision(refine):
+    assert len(refine(bar(5000, radii=(0, 0)), spacing=0.5).edges) <= 1000
+
+
 @pytest.mark.slow
 @settings(max_examples=60)
 @given(st.integers(0, 10**6), st.integers(1, 9), st.floats(0.2, 0.4), st.floats(0.3, 5))
