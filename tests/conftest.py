@@ -39,7 +39,7 @@ analysis/test_assessment analysis/test_curvature analysis/test_forestry analysis
 crosscheck interop io/formats io/test_colors io/test_cylinders io/test_skeletons io/test_streaming io/test_tubes
 meshlab recipes ros2 samples test_architecture test_benchmarks test_calibrate test_constants test_digest
 test_equations test_examples test_external test_filter_scripts test_fuzz test_gallery test_grasps test_leaderboard
-test_packaging test_site test_speed test_tiles test_trees test_typing viewing
+test_site test_speed test_tiles test_trees test_typing viewing
 """.split()  # noqa: SIM905
 """Folders and modules, by how their paths in `tests` begin, that are slow as a whole; single tests have the marker."""
 
