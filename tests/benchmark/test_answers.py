@@ -4,7 +4,8 @@ import gzip
 import json
 
 import pytest
-from glsk_bench import read_results, score_answers, scoring
+from glsk_bench import read_folder, read_results, score_answers, scoring
+from glsk_bench.folders import INDEX_NAME
 
 from glsk_o3d import Skeleton, save_skeleton
 from glsk_o3d.errors import FileFormatError
@@ -104,48 +105,39 @@ def test_times_are_taken_over(perfect, small):
     assert (rows["trees_100_clean"]["failure"], rows["trees_100_clean"]["seconds"]) == (None, 1.5)
 
 
-@pytest.mark.parametrize("text", ["", "[]", '{"clouds": {"a": 1}}'])
-def test_damaged_times(perfect, small, text):
-    (perfect / "times.json").write_text(text)
-    with pytest.raises(FileFormatError, match="is damaged"):
-        score_answers(small, perfect)
-
-
 def test_results_are_read_as_they_were_written(perfect, small, tmp_path):
     (perfect / f"{CLOUD}.obj").unlink()
     results = score_answers(str(small.path), perfect, name="Größe | 1")
     results.save(tmp_path / "scores.json")
-    assert read_results(tmp_path / "scores.json") == results
-    packed = tmp_path / "scores.json.gz"
-    packed.write_bytes(gzip.compress((tmp_path / "scores.json").read_bytes()))
-    assert read_results(packed) == results
-
-
-def test_results_without_the_measures_of_things_are_read(perfect, small, tmp_path):
-    results = score_answers(small, perfect)
-    results.save(tmp_path / "scores.json")
-    told = json.loads((tmp_path / "scores.json").read_text())
-    for row in told["clouds"]:
+    text = (tmp_path / "scores.json").read_text()
+    told = json.loads(text)
+    for row in told["clouds"]:  # as they were before things had measures of their own
         for name in scoring.OF_THINGS:
             assert row.pop(name) is None
     (tmp_path / "old.json").write_text(json.dumps(told))
-    assert read_results(tmp_path / "old.json") == results
+    (tmp_path / "scores.json.gz").write_bytes(gzip.compress(text.encode()))
+    for name in ("scores.json", "old.json", "scores.json.gz"):
+        assert read_results(tmp_path / name) == results
 
 
-@pytest.mark.parametrize(
-    "data",
-    [
-        b"",
-        b"{}",
-        b"[]",
-        b'{"benchmark": "v1", "name": "a", "whole": true, "clouds": [{}]}',
-        gzip.compress(b" " * 100_000),
-        gzip.compress(b" " * 100_000)[:-9],
-    ],
-)
-def test_damaged_results(tmp_path, monkeypatch, data):
-    monkeypatch.setattr(scoring, "MOST_RESULTS", 1000)  # packed ones may not fill the memory
-    path = tmp_path / f"scores.json{'.gz' * data.startswith(bytes([0x1F]))}"
-    path.write_bytes(data)
-    with pytest.raises(FileFormatError, match=rf"{path.name}: not the scores|it is too large"):
-        read_results(path)
+ROW = b'{"version": "v1", "complete": true, "shapes": {"a": {}}, "clouds": {"a": 1}}'
+PACKED = gzip.compress(b" " * 100_000)
+SCORES = b'{"benchmark": "v1", "name": "a", "whole": true, "clouds": [{}]}'
+
+
+@pytest.mark.parametrize("data", [b"", b"[]", ROW, SCORES, b"[" * 100_000])
+@pytest.mark.parametrize("name", ["times.json", "scores.json", INDEX_NAME])
+def test_damaged_files(perfect, small, name, data):
+    place = small.path if name == INDEX_NAME else perfect
+    read = {"scores.json": read_results, INDEX_NAME: lambda path: read_folder(path.parent)}
+    (place / name).write_bytes(data)
+    with pytest.raises(FileFormatError, match=name):
+        read.get(name, lambda path: score_answers(small, perfect))(place / name)
+
+
+@pytest.mark.parametrize("data", [PACKED, PACKED[:-9]])
+def test_packed_results_that_are_damaged_or_fill_the_memory(tmp_path, monkeypatch, data):
+    monkeypatch.setattr(scoring, "MOST_RESULTS", 1000)
+    (tmp_path / "scores.json.gz").write_bytes(data)
+    with pytest.raises(FileFormatError, match=r"not the scores|it is too large"):
+        read_results(tmp_path / "scores.json.gz")
