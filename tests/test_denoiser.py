@@ -74,6 +74,11 @@ def test_points_of_a_noisy_cylinder_come_nearer_to_it():
     assert np.mean(radius) == pytest.approx(1, abs=0.05)
 
 
+def test_clean_cylinder_does_not_move():
+    points = cylinder(0.01)
+    assert subspace_mean_shift(points, noise_of(points), 4) is points
+
+
 @pytest.mark.parametrize("share", [1, 0.25])
 def test_one_pass_by_its_definition(share):
     """A share of the way to the mean of the neighbours in a Gaussian, but for that along their main direction."""

@@ -151,9 +151,10 @@ def test_only_filters_can_be_joined_and_only_pipelines_run(thing):
         Pipeline()
 
 
-def test_incomplete_pipelines_are_refused():
+@pytest.mark.parametrize("incomplete", [RingBuilder(), RingBuilder() | Contractor()], ids=repr)
+def test_incomplete_pipelines_are_refused(incomplete):
     with pytest.raises(InvalidParameterError):
-        skeletonize(POINTS, RingBuilder() | Contractor())
+        skeletonize(POINTS, incomplete)
 
 
 def test_parameters_of_all_stages_are_checked_before_any_work():

@@ -150,3 +150,7 @@ class TestRadii:
         edges = np.array([[0, 1], [2, 3], [3, 4]])
         found = radii_from_points(nodes, edges, np.vstack([trunk, twig]))
         np.testing.assert_allclose(found, [2, 2, 0.1, 0.1, 0.1, 0.1], atol=0.01)  # the last has no edge: straight
+
+    def test_a_ball(self):
+        ball = samples.sphere(500).points
+        np.testing.assert_allclose(radii_from_points(np.zeros((1, 3)), np.empty((0, 2), int), ball), [0.5], rtol=0.01)

@@ -1,11 +1,15 @@
 """Shapes: what families promise, what is counted of them, and that seeds give the same ones for ever."""
 
+from itertools import combinations
+
 import networkx as nx
 import numpy as np
 import pytest
 from glsk_bench.shapes import FAMILIES, shape
-from glsk_bench.shapes.axis import Axis, UnfitDraw
+from glsk_bench.shapes.axis import Axis, UnfitDraw, subdivided
+from glsk_bench.shapes.curves import generator
 from glsk_bench.shapes.drawing import DRAWN_BY, SURFACE_POINTS
+from scipy.spatial.distance import cdist
 
 from glsk_o3d.errors import InvalidParameterError
 
@@ -75,6 +79,26 @@ def test_families_have_what_they_promise(seed, drawn):
     assert components == 1
     assert 1 <= loops <= 6
     assert 2 <= counts(drawn("groups", seed))[0] <= 3
+
+
+def test_parts_of_groups_keep_their_distance_and_come_near():
+    gaps, refused = [], 0
+    for seed in range(30):
+        try:
+            axis = DRAWN_BY["groups"](generator("group", seed))
+        except UnfitDraw:
+            refused += 1
+            continue
+        nodes, edges, radii = subdivided(axis.nodes, axis.edges, axis.radii)
+        parts = [np.array(sorted(part)) for part in nx.connected_components(nx.Graph(edges.tolist()))]
+        between = [
+            (cdist(nodes[a], nodes[b]) - radii[a][:, None] - radii[b]).min() / min(radii[a].min(), radii[b].min())
+            for a, b in combinations(parts, 2)
+        ]
+        gaps.append(min(between))
+    assert refused > 1
+    assert 0.7 - 1e-9 < min(gaps) < 0.9
+    assert 1.9 < max(gaps) < 2.05 + 1e-9
 
 
 def test_refused_draws_are_counted(monkeypatch):
