@@ -4,6 +4,7 @@ import pytest
 
 from glsk_o3d import Report, Skeleton, skeletonize
 from glsk_o3d.samples import torus
+from glsk_o3d.skeleton import ARRAYS as ARRAYS_OF_SKELETONS
 
 TOOL = "fuzz"
 
@@ -30,11 +31,16 @@ def test_every_reader_reads_the_files_that_are_to_be_damaged(parts, tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning", "ignore::DeprecationWarning")
-def test_degenerate_skeletons_can_be_used(parts, tmp_path):
+def test_degenerate_skeletons_and_extreme_ones_can_be_used(parts, tmp_path):
     """Or are refused in a sentence."""
     for name, fields in parts.unsound.seeds().items():
         sound = Skeleton(**{**fields, "report": Report.from_dict(fields["report"])})
         assert list(parts.unsound.used(sound, tmp_path, parts.unsound.USES)) == [], name
+    tree = parts.unsound.seeds()["tree"]
+    for field, factor in (("vertices", 1e149), ("vertices", 5e-324), ("radii", 1e149), ("radii", 5e-324)):
+        arrays = {**{name: tree[name] for name in ARRAYS_OF_SKELETONS}, field: factor * tree[field]}
+        sound = Skeleton(**{**arrays, "half_width": (), "half_thickness": ()})
+        assert list(parts.unsound.used(sound, tmp_path, parts.unsound.USES)) == [], (field, factor)
 
 
 def test_what_is_wrong_is_found(parts):

@@ -3,9 +3,11 @@
 import json
 
 import numpy as np
+import open3d as o3d
 import pytest
 from scipy.io import savemat
 
+from glsk_o3d import samples
 from glsk_o3d.samples import Sample
 
 TOOL = "trees"
@@ -102,3 +104,28 @@ class TestCommands:
         assert line[1:4] == ["1", "1", "1"]
         assert len(last) == len(header)
         assert last[-1] == "no"
+
+    def test_a_scan_beside_its_model(self, call, tmp_path):
+        drawn = samples.tree(8000, forks=2, length=4, radius=0.2, seed=3)
+        scan = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(drawn.points))
+        o3d.io.write_point_cloud(str(tmp_path / "scan.ply"), scan)
+        names = ["ID", "parentID", *(f"{end}{axis}" for end in ("start", "end") for axis in "XYZ"), "radius", "length"]
+        columns = [[0, 1, 2], PARENT, START, END, RADIUS, LENGTH, ORDER]
+        model = written(tmp_path / "model.csv", [*names, "branchOrder"], columns)
+        out = call("models", tmp_path / "scan.ply", model, "-o", tmp_path / "m.json")
+        (row,) = json.loads((tmp_path / "m.json").read_text())["rows"]
+        assert row["stem_diameter"] == pytest.approx(
+            [2 * np.interp(1.1, drawn.nodes[:7, 2], drawn.radii[:7]), 0.4], rel=0.05
+        )
+        assert row["height"][1] == 4
+        assert "scan" in out
+        call("models", tmp_path / "scan.ply", code=2)
+
+    def test_large(self, parts, tmp_path):
+        np.save(tmp_path / "scan.npy", samples.tree(2000, forks=2, cameras=parts.trees.CAMERAS).points)
+        facts = dict(n=2000, pipeline="default, untraced")
+        ((_, header, (line, failed)),) = parts.trees.large_tables(
+            [facts | parts.trees.once(tmp_path / "scan.npy", facts["pipeline"]), facts | dict(failure="ValueError: no")]
+        )
+        assert dict(zip(header, line, strict=True))["traced"] == "0"
+        assert failed == ["default, untraced", "2000", *"-" * 7, "ValueError: no"]
