@@ -226,6 +226,7 @@ USES: tuple[Callable[[Skeleton, Path], object], ...] = (
         lambda it, _, color=color: glsk.to_line_set(it, color)
         for color in ("branch", "order", "radius", "confidence", "support", "thickness")
     ),
+    lambda it, _: glsk.to_tensor_line_set(it, "radius"),
     lambda it, _: glsk.to_tubes(it),
     lambda it, _: glsk.to_tubes(it, radius=0.1),
     lambda it, _: glsk.to_pymeshlab(it),

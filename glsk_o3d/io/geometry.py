@@ -11,7 +11,7 @@ from ..interop.packages import import_open3d
 from ..numerics.neighbourhoods import plane_axes
 from ..numerics.vectors import TINY, dot, unit
 from ..refinement.sections import measure_sections
-from ..skeleton import Skeleton
+from ..skeleton import OF_VERTICES, Skeleton
 from .colors import ColorChoice, shades
 
 
@@ -43,6 +43,43 @@ def to_line_set(skeleton: Skeleton, color: ColorChoice = "branch") -> Any:
     lines = skeleton.to_line_set()
     shown = shades(skeleton, color, branch_of_edge(skeleton), skeleton.edges)
     lines.colors = import_open3d().utility.Vector3dVector(np.ascontiguousarray(shown).reshape(-1, 3))
+    return lines
+
+
+def to_tensor_line_set(skeleton: Skeleton, color: ColorChoice | None = None) -> Any:
+    """A skeleton as a tensor line set on the CPU, with all attributes of vertices and edges.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    color : as of `to_line_set`, optional
+
+    Returns
+    -------
+    open3d.t.geometry.LineSet
+        With ``point.radius``, ``point.confidence``, ``point.half_width``, ``point.half_thickness`` and
+        ``point.support`` (M, 1) float64, ``line.branch`` (E, 1) int32 and, with a color, ``line.colors``.
+
+    Raises
+    ------
+    InvalidParameterError, MissingPackageError
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> ring = skeletonize(torus(1000).points)
+    >>> to_tensor_line_set(ring).line.branch.shape[0] == len(ring.edges)
+    True
+    """
+    o3d, branch = import_open3d(), branch_of_edge(skeleton)
+    lines = o3d.t.geometry.LineSet(o3d.core.Tensor(skeleton.vertices), o3d.core.Tensor(skeleton.edges))
+    for name, field in zip(("radius", *OF_VERTICES[1:]), OF_VERTICES, strict=True):
+        lines.point[name] = o3d.core.Tensor(getattr(skeleton, field)[:, None])
+    lines.line["branch"] = o3d.core.Tensor(branch.astype(np.int32)[:, None])
+    if color is not None:
+        shown = shades(skeleton, color, branch, skeleton.edges)
+        lines.line["colors"] = o3d.core.Tensor(np.ascontiguousarray(shown).reshape(-1, 3))
     return lines
 
 

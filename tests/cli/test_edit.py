@@ -117,7 +117,10 @@ def test_a_cloud_hangs_on_the_bones(invoke, tmp_path, y, cloud, ending):
     assert same_bytes(tmp_path / "r.glb", tmp_path / "expected.glb")
 
 
-def test_alone_it_has_its_tubes_and_loops_are_cut_if_one_says_so(invoke, ring_file, tmp_path):
+def test_alone_it_has_its_tubes_and_loops_are_cut_if_one_says_so(invoke, ring_file, y, tmp_path):
     assert invoke("rig", ring_file, "-o", "r.glb", "--cut-loops").exit_code == 0
     save_rig(read_skeleton(tmp_path / ring_file), tmp_path / "expected.glb", cut_loops=True)
     assert same_bytes(tmp_path / "r.glb", tmp_path / "expected.glb")
+    assert invoke("rig", y, "-o", "r.bvh", "--up", "y").exit_code == 0
+    save_rig(read_skeleton(tmp_path / y), tmp_path / "expected.bvh", up="y")
+    assert same_bytes(tmp_path / "r.bvh", tmp_path / "expected.bvh")
