@@ -24,7 +24,6 @@ Promises = Iterator[tuple[str, int, Change]]  # what is promised, the number, an
 PAGE, PAGE_DATA = 1024, 1020  # published: E57's pages, without and with what checks them
 SIZES = (1, 2, 3, 7, 60, 400)
 FAR = (10**6, -(10**6), 2**16, 2**31, 2**32, 2**62)
-MOST_POINTS = 1000
 
 
 # ---------------------------------------------------------------------------------------------------------------- lies
