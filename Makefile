@@ -80,10 +80,9 @@ $(VENV)/.installed-demo: pyproject.toml benchmarks/pyproject.toml | $(BIN)/pytho
 	@$(PIP) install --editable '.[pictures]' --editable benchmarks
 	@touch $@
 
-$(VENV)/.installed-test: pyproject.toml benchmarks/pyproject.toml tests/readers.txt | $(BIN)/python
+$(VENV)/.installed-test: pyproject.toml benchmarks/pyproject.toml | $(BIN)/python
 	@echo "Installing glsk-o3d and what its tests need into $(VENV); the first time this takes a minute or more"
 	@$(PIP) install --editable '.[test,lint]' --editable benchmarks
-	@$(PIP) install --no-deps -r tests/readers.txt
 	@touch $@ $(VENV)/.installed-demo
 
 $(VENV)/.installed-docs: pyproject.toml benchmarks/pyproject.toml | $(BIN)/python

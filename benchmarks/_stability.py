@@ -16,19 +16,15 @@ from scipy.spatial.transform import Rotation
 
 from glsk_o3d import Contractor, LPRReducer, Pipeline
 from glsk_o3d.cli.overrides import override
+from glsk_o3d.numerics.polylines import nearest_on_edges
 from glsk_o3d.pipelines import rings
 
 
 def feet(points, nodes, edges):
     """Distance of each point to a curve of straight edges, the edge it is nearest to, and how far along that edge."""
-    start, end = nodes[edges].swapaxes(0, 1)
-    span, offset = end - start, points[:, None] - start
-    part = (offset * span).sum(axis=2) / np.maximum((span**2).sum(axis=1), np.finfo(float).tiny)
-    part = np.clip(part, 0, 1)
-    distance = np.linalg.norm(offset - part[:, :, None] * span, axis=2)
-    edge = distance.argmin(axis=1)
-    row = np.arange(len(points))
-    return distance[row, edge], edge, part[row, edge]
+    edge, part = nearest_on_edges(nodes, edges, np.tile(np.arange(len(edges)), (len(points), 1)), points)
+    start, end = nodes[edges[edge]].swapaxes(0, 1)
+    return np.linalg.norm(points - start - part[:, None] * (end - start), axis=1), edge, part
 
 
 def local_radius(axis, points):

@@ -188,13 +188,15 @@ def publish(
     where: str = "",
     page: Path | None = None,
     part: str = "",
+    shown: int | None = None,
 ) -> Tables:
-    """Save rows, print the tables that are made of them, and put these into a part of a page; gives the tables."""
+    """Save rows, print the tables that are made of them, and put so many into a part of a page; gives the tables."""
     save(output, rows)
     tables = make(rows)
     present(tables, markdown, where)
     if page is not None:
-        fill(page, {part: "\n".join([where, "", *(markdown_table(*it) for it in tables)]) if where else tables})
+        told = tables[:shown]
+        fill(page, {part: "\n".join([where, "", *(markdown_table(*it) for it in told)]) if where else told})
     return tables
 
 

@@ -238,10 +238,6 @@ USES: tuple[Callable[[Skeleton, Path], object], ...] = (
     lambda it, _: analysis.segment(it, np.eye(3)),
     lambda it, _: analysis.tree_measures(it),
     lambda it, folder: analysis.cylinders(it).to_csv(folder / "c.csv"),
-    *(
-        lambda it, folder, ending=ending: glsk.save_cylinders(analysis.cylinders(it), folder / f"c{ending}")
-        for ending in (".csv", ".qsm.csv", ".mat")
-    ),
     lambda it, _: analysis.assess(it, it.points),
     lambda it, _: analysis.assess(it, samples.torus(100).points),
     lambda it, _: analysis.compare(it, samples.torus(100)),

@@ -16,7 +16,7 @@ import numpy as np
 import typer
 from _peers import installed, one_thread, versions
 from _runs import Folder, Jobs, Markdown, Output, application, run
-from _tables import Tables, fill, machine, markdown_table, page_with, present, save
+from _tables import machine, page_with, publish
 
 from glsk_o3d import samples
 
@@ -48,8 +48,8 @@ def curves(
     one_thread()
     work = [(dict(tool=name, **it.facts), (it, made)) for name, made in tools.items() for it in found]
     rows = run(_trees.measure_curve, work, jobs, fresh=True, limit=limit)
-    save(output, rows)
-    told("trees of a folder" if folder else "trees", _trees.curve_tables(rows), where, page, markdown)
+    part = "trees of a folder" if folder else "trees"
+    publish(rows, _trees.curve_tables, output, markdown, where, page, part, shown=1)
 
 
 @app.command()
@@ -64,8 +64,7 @@ def measures(
     where = machine()
     work = [(dict(condition=it, tree=seed), (seed, it)) for it in ("clean", "lidar") for seed in range(trees)]
     rows = run(_trees.measure_tree, work, jobs)
-    save(output, rows)
-    told("measures", _trees.measure_tables(rows), where, page, markdown)
+    publish(rows, _trees.measure_tables, output, markdown, where, page, "measures")
 
 
 @app.command()
@@ -87,8 +86,7 @@ def stems(
         for seed in range(first, first + trees)
     ]
     rows = run(_trees.measure_stem, work, jobs)
-    save(output, rows)
-    told("stems", _trees.stem_tables(rows), where, page, markdown)
+    publish(rows, _trees.stem_tables, output, markdown, where, page, "stems", shown=1)
 
 
 @app.command()
@@ -107,8 +105,7 @@ def models(
     where = machine()
     work = [(dict(tree=cloud.stem), (cloud, model, unit)) for cloud, model in zip(paths[::2], paths[1::2], strict=True)]
     rows = run(_trees.measure_model, work, 1)
-    save(output, rows)
-    present(_trees.model_tables(rows), markdown, where)
+    publish(rows, _trees.model_tables, output, markdown, where)
 
 
 @app.command()
@@ -128,15 +125,7 @@ def large(
             np.save(path, samples.tree(n, forks=forks, seed=1, noise=_trees.NOISE, cameras=_trees.CAMERAS).points)
             work = [(dict(n=n, pipeline=name), (path, name)) for name in _trees.PIPELINES]
             rows += run(_trees.once, work, 1, fresh=True)
-    save(output, rows)
-    told("large", _trees.large_tables(rows), where, page, markdown)
-
-
-def told(name: str, tables: Tables, where: str, page: Path | None, markdown: bool) -> None:
-    """Print tables, and put the first of them into a page."""
-    present(tables, markdown, where)
-    if page is not None:
-        fill(page, {name: "\n".join([where, "", markdown_table(*tables[0])])})
+    publish(rows, _trees.large_tables, output, markdown, where, page, "large")
 
 
 if __name__ == "__main__":

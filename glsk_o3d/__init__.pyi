@@ -25,8 +25,7 @@ from .errors import (
     StageError,
 )
 from .interop.clouds import Cloud
-from .io.annotation import annotate, annotate_contraction
-from .io.cylinders import save_cylinders
+from .io.annotation import annotate
 from .io.formats.gltf import save_rig
 from .io.geometry import to_line_set, to_tensor_line_set, to_tubes
 from .io.meshes import save_mesh
@@ -95,7 +94,6 @@ __all__ = [
     "Tracer",
     "analysis",
     "annotate",
-    "annotate_contraction",
     "annotate_file",
     "batch",
     "crosscheck",
@@ -109,7 +107,6 @@ __all__ = [
     "read_tensor_cloud",
     "read_truth",
     "remove_redundant_points",
-    "save_cylinders",
     "save_mesh",
     "save_preview",
     "save_recipe",

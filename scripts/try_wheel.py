@@ -24,7 +24,7 @@ filters
 info
 info demo/cloud.ply
 info demo/skeleton.json
-skeletonize demo/cloud.ply -o s.json -o s.vtp -o s.dxf -o s.ply --where z>-9
+skeletonize demo/cloud.ply -o s.json -o s.vtp -o s.ply --where z>-9
 skeletonize demo/cloud.ply --pipeline tree -o t.json
 skeletonize demo/cloud.ply -o r.json --preview r.png --report r.html
 batch demo/cloud.ply -o many

@@ -36,10 +36,10 @@ settings.load_profile("suite")
 
 SLOW = """
 analysis/test_assessment analysis/test_curvature analysis/test_forestry analysis/test_grasp batch benchmark cli
-crosscheck interop io/formats io/test_colors io/test_cylinders io/test_skeletons io/test_streaming io/test_tubes
+crosscheck interop io/formats io/test_colors io/test_skeletons io/test_streaming io/test_tubes
 meshlab recipes ros2 samples test_architecture test_benchmarks test_calibrate test_constants test_digest
 test_equations test_examples test_external test_filter_scripts test_fuzz test_gallery test_grasps test_leaderboard
-test_packaging test_site test_speed test_tiles test_trees test_typing viewing
+test_site test_speed test_tiles test_trees test_typing viewing
 """.split()  # noqa: SIM905
 """Folders and modules, by how their paths in `tests` begin, that are slow as a whole; single tests have the marker."""
 
@@ -94,9 +94,26 @@ def benchmark(root):
     return imported
 
 
+@pytest.fixture(scope="module")
+def tool(request, benchmark):
+    """The benchmark that a test's module names TOOL, as a module."""
+    with benchmark(request.module.TOOL) as module:
+        yield module
+
+
+@pytest.fixture(scope="module")
+def parts(tool):
+    """The modules that it is made of, by their names."""
+    folder = Path(tool.__file__).parent
+    found = {name: module for name, module in sys.modules.items() if name.startswith("_")}
+    return SimpleNamespace(
+        **{n[1:]: each for n, each in found.items() if Path(getattr(each, "__file__", None) or "").parent == folder}
+    )
+
+
 @pytest.fixture
 def call(tool):
-    """Run a command of the benchmark that a test's module calls `tool`; gives what it printed."""
+    """Run a command of `tool`; gives what it printed."""
 
     def run(*arguments, code=0):
         result = CliRunner().invoke(tool.app, [*map(str, arguments)])

@@ -251,28 +251,6 @@ def test_thrown_points_are_held(built, monkeypatch):
     np.testing.assert_allclose(state.positions[thrown], built.positions[thrown], atol=1e-4)
 
 
-@pytest.mark.parametrize(("thrown", "retries"), [([7], 0), ([7, 3, 250], 2)])
-def test_too_many_retries_refuse(built, monkeypatch, thrown, retries):
-    capture = Capture(monkeypatch, thrown)
-    state = Contractor(retries=retries)(built)
-    assert len(capture.calls) == retries + 1
-    assert state.report.iterations == ()
-    assert state.report.stop_reason == (
-        "solve 1 refused, last sound state kept: it would throw 1 of 400 points far out of the cloud"
-    )
-    same(state, built)
-
-
-@pytest.mark.parametrize("floor", [0, 3])
-def test_attraction_has_a_floor_and_a_cap(built, monkeypatch, floor):
-    size = built.ring_size0.copy()
-    size[:4] *= [4, 0.25, 1e-9, 0]
-    capture = Capture(monkeypatch)
-    Contractor(max_iterations=1, min_attraction=floor, max_attraction=500.0)(replace(built, ring_size=size))
-    ((_, weight),) = capture.calls
-    np.testing.assert_allclose(weight[:5], np.maximum([0.25, 4, 500, 500, 1], floor))
-
-
 # ---- what is a line already
 
 

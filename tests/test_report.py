@@ -1,5 +1,6 @@
 """Report, IterationRecord and Decision."""
 
+import contextlib
 import dataclasses
 import json
 import re
@@ -36,20 +37,14 @@ def test_survives_json(report):
     assert Report.from_dict({}) == Report()
 
 
-WRONG = (None, "x", -0.5, True, 10**400, ["x", 2], [[1]], {}, {"a": []})
-"""What may stand in a file."""
-
-
 @pytest.mark.parametrize("name", [field.name for field in dataclasses.fields(Report)])
 def test_an_entry_of_another_type_is_refused_or_means_the_same(report, name):
     """Else it would be found out where it is printed."""
-    for value in WRONG:
-        try:
-            again = Report.from_dict({**report.to_dict(), name: value})
-        except (ValueError, TypeError, AttributeError):  # each of which a reader says in a sentence
-            continue
-        assert type(getattr(again, name)) is type(getattr(report, name))
-        assert json.dumps(getattr(again, name)) in (json.dumps(value), "{}", "[]")
+    for value in (None, "x", -0.5, True, 10**400, ["x", 2], [[1]], {}, {"a": []}):
+        with contextlib.suppress(ValueError, TypeError, AttributeError):  # each of which a reader says in a sentence
+            again = getattr(Report.from_dict({**report.to_dict(), name: value}), name)
+            assert type(again) is type(getattr(report, name))
+            assert json.dumps(again) in (json.dumps(value), "{}", "[]")
 
 
 def test_places_on_a_map_keep_their_digits():
@@ -62,24 +57,22 @@ def test_print_says_the_main_things_in_about_ten_lines():
         n_input=900,
         n_dropped=2,
         n_contracted=500,
-        n_loops_closed=1,
         decisions=(Decision("loop", (0.0, 0.5, -2.0), 0.45, changed=True),),
         seconds={"Sampler": 0.25, "Refiner": 0.5},
-        warnings=("sheet-like: so it is",),
+        warnings=("sheet-like: a < b",),
     )
-    said = str(report)
+    lines = str(report).splitlines()
     for words in (
-        "counts      900 input, 2 dropped, 500 contracted, 1 loops closed",
+        "counts      900 input, 2 dropped, 500 contracted",
         "uncertain   the loop at (0, 0.5, -2) is a handle: 0.45, loop closed",
         "seconds     Sampler 0.25, Refiner 0.50",
-        "warning     sheet-like: so it is",
+        "warning     sheet-like: a < b",
     ):
-        assert words in said.splitlines()
-    assert len(said.splitlines()) <= 12
-    html = replace(report, warnings=("a < b",))._repr_html_()
-    assert html.count("<tr>") == len(said.splitlines()) - 1
-    assert re.findall("<td [^>]*>([^<]*)</td>", html)[-2:] == ["warning", "a &lt; b"]
-    assert str(Report()).splitlines()[2] == "counts"
+        assert words in lines
+    assert len(lines) <= 12
+    html = report._repr_html_()
+    assert html.count("<tr>") == len(lines) - 1
+    assert re.findall("<td [^>]*>([^<]*)</td>", html)[-2:] == ["warning", "sheet-like: a &lt; b"]
     assert eval(repr(report.decisions)) == report.decisions
 
 

@@ -1,13 +1,11 @@
 """Sampler: cloud -> points."""
 
 import numpy as np
-import pytest
 
 from glsk_o3d import (
     Connector,
     Contractor,
     Denoiser,
-    InvalidCloudError,
     LPRReducer,
     OutlierRemover,
     Points,
@@ -31,20 +29,6 @@ def test_a_filter_of_points_takes_a_cloud_too():
     assert isinstance(plain, Points)
     np.testing.assert_allclose(np.sort(plain.to_point_cloud().points, axis=0), np.sort(TORUS, axis=0), atol=1e-15)
     np.testing.assert_array_equal(RingBuilder()(TORUS).rings.indices, (Sampler() | RingBuilder())(TORUS).rings.indices)
-
-
-def test_invalid_points_are_counted_and_dropped_only_when_asked():
-    points = TORUS.copy()
-    points[[5, 70, 599]] = [[np.nan, 0, 0], [0, np.inf, 0], [0, 0, -np.inf]]
-    with pytest.raises(InvalidCloudError, match=r"index 5.*drop_invalid=True"):
-        RingBuilder()(points)
-    state = (Sampler(drop_invalid=True) | RingBuilder())(points)
-    assert (state.report.n_input, state.report.n_dropped, state.report.n_distinct) == (600, 3, 597)
-    np.testing.assert_array_equal(np.flatnonzero(state.representative_of_point < 0), [5, 70, 599])
-    np.testing.assert_array_equal(np.flatnonzero(state.survivor_of_point < 0), [5, 70, 599])
-    valid = np.delete(TORUS, [5, 70, 599], axis=0)
-    np.testing.assert_array_equal(state.cloud, RingBuilder()(valid).cloud)
-    assert 599 not in state.point_of_survivor
 
 
 def test_a_large_cloud_is_sampled_and_every_point_has_its_place():

@@ -11,7 +11,6 @@ from glsk_o3d import (
     OutlierRemover,
     Refiner,
     RingBuilder,
-    Sampler,
     StageError,
     Thinner,
     pipelines,
@@ -21,8 +20,6 @@ from glsk_o3d.denoiser import MOST_IN_ONE, average_noisy
 from glsk_o3d.numerics.grid_sampling import sample_grid
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours, principal
 from glsk_o3d.thinner import ENOUGH, default_size, spacing_enough, thin, thin_nearer
-
-PREPARED = Sampler() | OutlierRemover() | Denoiser()
 
 
 def thinned(points, n, k=16):
@@ -54,14 +51,6 @@ def test_nearest_pairs_go_first():
         np.testing.assert_array_equal(into[:merged] == into[10 : 10 + merged], True)
         assert len(left(into)) == 20 - merged
         assert (into[merged:10] == np.arange(merged, 10)).all()
-
-
-def test_grids_end_somewhere():
-    """Where all distances are equal no two points may choose each other; more are left then, and it ends."""
-    grid = np.stack(np.meshgrid(*[np.arange(12.0)] * 2, [0.0]), -1).reshape(-1, 3)
-    into = thinned(grid, 10)
-    assert 10 <= len(left(into)) < 144
-    np.testing.assert_array_equal(into[into], into)
 
 
 # ---- where there are more than enough
@@ -171,22 +160,6 @@ def test_thinned_clouds_keep_all_points_and_their_mass():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("n", [4000, 16000])
-def test_a_tube_is_contracted_with_as_many_points_around_it_as_are_enough(n):
-    """Whatever their number: the points contracted have the spacing of a tube with `around` points around it."""
-    sample = samples.torus(n, radius=0.1)
-    state = (PREPARED | Thinner() | RingBuilder())(sample.points)
-    area = 4 * np.pi**2 * 0.4 * 0.1
-    around = 2 * np.pi * 0.1 / np.sqrt(area / len(state))
-    assert 18 < around < 45
-    assert len(state) < 0.9 * n
-    assert state.mass.mean() == pytest.approx(1, rel=1e-12)
-    if n > 4000:  # of fewer all of the surface has no more than its share
-        finer = (PREPARED | Thinner(around=45))(sample.points)
-        assert len(finer) > len(state)
-
-
-@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")  # normals are those of the lines
 def test_scan_lines_much_denser_than_they_are_apart_are_a_surface():
     """The nearest points of each are of its own line, and show no plane; among those that are left they do."""
@@ -197,13 +170,6 @@ def test_scan_lines_much_denser_than_they_are_apart_are_a_surface():
     )
     assert found.report.n_contracted < 3000
     assert (found.n_components, found.n_loops, len(found.leaves)) == (1, 0, 2)
-
-
-@pytest.mark.parametrize("around", [1e-310, 1, 1000])
-def test_any_number_around_is_taken_on_curves_and_surfaces(around):
-    t = np.linspace(0, 6, 3000)
-    for points in (np.column_stack([np.cos(t), np.sin(t), 0.3 * t]), samples.torus(3000).points):
-        assert 100 < len(Thinner(around=around)(points)) <= 3000
 
 
 def test_thin_parts_keep_their_points():

@@ -5,11 +5,7 @@ import pytest
 
 from glsk_o3d import Skeleton
 
-
-@pytest.fixture(scope="module")
-def tool(benchmark):
-    with benchmark("tiles") as module:
-        yield module
+TOOL = "tiles"
 
 
 @pytest.fixture(scope="module")

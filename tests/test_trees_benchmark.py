@@ -1,68 +1,36 @@
 """The benchmark of trees: its clouds, its scores, the volume of its shapes, and its commands on a few trees."""
 
 import json
-import sys
 
 import numpy as np
 import open3d as o3d
 import pytest
 from scipy.io import savemat
-from typer import BadParameter
 
 from glsk_o3d import samples
 from glsk_o3d.samples import Sample
 
-
-@pytest.fixture(scope="module")
-def tool(benchmark):
-    with benchmark("trees") as module:
-        yield module
-
-
-@pytest.fixture(scope="module")
-def parts(tool):
-    return sys.modules["_trees"]
+TOOL = "trees"
 
 
 class TestClouds:
-    def test_conditions_are_what_the_page_says(self, parts):
-        made = {condition: parts.builtin(0, condition) for condition in parts.CONDITIONS}
-        clean, noise, missing, uneven = (points for points, _, _ in made.values())
-        assert (len(clean), len(noise)) == (4096, 2048)
-        np.testing.assert_allclose((noise - clean[::2]).std(), 0.004 * np.linalg.norm(np.ptp(clean, axis=0)), rtol=0.05)
-        assert 0.3 * len(clean) < len(missing) < 0.5 * len(clean)
-        low, high = (
-            np.count_nonzero(uneven[:, 2] > at) / np.count_nonzero(clean[:, 2] > at)
-            for at in (0, 0.8 * clean[:, 2].max())
-        )
-        assert high < 0.2 < low
-
     def test_volume_of_two_balls_with_a_cone_between_and_of_overlaps(self, parts):
         capsule = Sample(np.zeros((1, 3)), np.array([[0, 0, 0], [2.0, 0, 0]]), np.array([[0, 1]]), np.ones(2), "one")
         expected = np.pi * (2 + 4 / 3)
-        assert parts.volume(capsule, 400_000) == pytest.approx(expected, rel=0.01)
+        assert parts.trees.volume(capsule, 400_000) == pytest.approx(expected, rel=0.01)
         twice = Sample(capsule.points, capsule.nodes, np.array([[0, 1], [0, 1]]), capsule.radii, "twice")
-        assert parts.volume(twice, 400_000) == pytest.approx(expected, rel=0.01)
+        assert parts.trees.volume(twice, 400_000) == pytest.approx(expected, rel=0.01)
 
 
 class TestScores:
     def test_half_of_a_line(self, parts):
         """Its diagonal is 1: all of the half is right, and half of the line is there."""
-        whole = parts.skeleton_of(np.array([[0, 0, 0], [1.0, 0, 0]]), np.array([[0, 1]]))
-        half = parts.skeleton_of(np.array([[0, 0, 0], [0.5, 0, 0]]), np.array([[0, 1]]))
-        found = parts.score(np.array([[0, 0, 0], [1.0, 0, 0]]), whole, half)
+        whole = parts.trees.skeleton_of(np.array([[0, 0, 0], [1.0, 0, 0]]), np.array([[0, 1]]))
+        half = parts.trees.skeleton_of(np.array([[0, 0, 0], [0.5, 0, 0]]), np.array([[0, 1]]))
+        found = parts.trees.score(np.array([[0, 0, 0], [1.0, 0, 0]]), whole, half)
         assert found["precision"] == 1
         assert found["recall"] == pytest.approx(0.51, abs=0.003)
         assert found["completeness"] == pytest.approx(100 / 8, rel=0.01)
-
-
-class TestTools:
-    def test_pieces_are_joined_where_they_are_nearest(self, parts):
-        line = np.column_stack([np.zeros((60, 2)), np.arange(60) * 0.1])
-        points = np.concatenate([line, line + [0, 0, 9], line + [3, 0, 3]])
-        vertices, edges = parts.level_sets(points)
-        assert len(edges) == len(vertices) - 1
-        assert np.linalg.norm(np.diff(vertices[edges], axis=1)[:, 0], axis=1).max() < 3.5
 
 
 START = np.array([[0, 0, 0.5], [0, 0, 2.5], [0, 0, 2.5]])
@@ -80,13 +48,10 @@ def written(path, names, columns, between=","):
 
 
 class TestModels:
-    @pytest.fixture(params=("TreeQSM", "TreeQSM text", "TreeQSM matrix", "SimpleForest", "aRchi"))
+    @pytest.fixture(params=("TreeQSM text", "TreeQSM matrix", "SimpleForest", "aRchi"))
     def model(self, request, tmp_path):
         """The three cylinders as programs write them."""
         path, ends = tmp_path / "model.txt", [f"{end}{axis}" for end in ("start", "end") for axis in "XYZ"]
-        if request.param == "TreeQSM":
-            names = ["radius", "length", *(f"{it}.{axis}" for it in ("start", "axis") for axis in "xyz"), "BranchOrder"]
-            return written(path, names, [RADIUS, LENGTH, START, AXIS, ORDER])
         if request.param == "TreeQSM text":
             names = ["radius (m)", "length (m)", "start_point", "axis_direction", "parent", "extension", "branch"]
             columns = [RADIUS, LENGTH, START, AXIS, PARENT, [2, 0, 0], [1, 1, 2], ORDER, [1, 2, 1], [0, 0, 0]]
@@ -103,21 +68,42 @@ class TestModels:
         return written(path, names, columns)
 
     def test_measures_are_those_of_the_cylinders(self, parts, model):
-        found = parts.read_cylinder_model(model)
+        found = parts.trees.read_cylinder_model(model)
         assert found.height == pytest.approx(4)
         assert found.stem_diameter == pytest.approx(0.4)
         assert found.volume == pytest.approx(np.pi * (0.04 * 2 + 0.0225 * 2 + 0.01 * 2.5))
         assert found.order.tolist() == [0, 0, 1]
         np.testing.assert_allclose(found.end, END)
 
-    def test_other_tables_are_named(self, parts, tmp_path):
-        with pytest.raises(BadParameter, match="columns of TreeQSM, SimpleForest, aRchi; there are a, b"):
-            parts.read_cylinder_model(written(tmp_path / "no.csv", ["a", "b"], [[1.0], [2.0]]))
-        with pytest.raises(BadParameter, match="3 names stand above 1 columns"):
-            parts.read_cylinder_model(written(tmp_path / "torn.csv", ["a", "b", "c"], [[1.0]]))
-        (tmp_path / "ours.txt").write_text("# a tree of treetools\nx,y,z\n1,2,3, 4,5,6\n")
-        with pytest.raises(BadParameter, match=r"ours\.txt: no table: its lines have different numbers of columns"):
-            parts.read_cylinder_model(tmp_path / "ours.txt")
+
+class TestCommands:
+    def test_curves(self, call, tmp_path):
+        page = tmp_path / "page.md"
+        page.write_text("before\n<!-- trees -->\n<!-- end -->\n<!-- trees of a folder -->\n<!-- end -->\nafter\n")
+        out = call("curves", "--trees", 1, "--tool", "levels", "--jobs", 0, "-o", tmp_path / "t.json", "--page", page)
+        rows = json.loads((tmp_path / "t.json").read_text())["rows"]
+        assert [row["condition"] for row in rows] == ["clean", "noise", "missing", "uneven"]
+        assert all((row["components"], row["loops"]) == (1, 0) for row in rows)
+        assert "4/4" in out
+        assert "geodesic level sets" in page.read_text().split("<!-- trees of a folder -->")[0]
+
+    def test_measures(self, call, tmp_path):
+        out = call("measures", "--trees", 1, "--jobs", 0, "-o", tmp_path / "m.json")
+        rows = json.loads((tmp_path / "m.json").read_text())["rows"]
+        assert [row["condition"] for row in rows] == ["clean", "lidar"]
+        assert all(abs(row["volume"]) < 0.05 for row in rows)
+        assert "clean: stem diameter" in out
+
+    def test_stems(self, call, parts, tmp_path):
+        out = call("stems", "--trees", 1, "--jobs", 0, "-o", tmp_path / "s.json")
+        rows = json.loads((tmp_path / "s.json").read_text())["rows"]
+        assert [(row["seeds"], row["tree"]) for row in rows] == [("chosen", 0), ("other", 100)]
+        assert all(abs(row["stem_diameter"] / row["true_diameter"] - 1) < 0.03 for row in rows)
+        assert "other seeds, all" in out
+        (_, _, (line, *_)), (_, header, (*_, last)) = parts.trees.stem_tables([rows[0], rows[1] | dict(failure="no")])
+        assert line[1:4] == ["1", "1", "1"]
+        assert len(last) == len(header)
+        assert last[-1] == "no"
 
     def test_a_scan_beside_its_model(self, call, tmp_path):
         drawn = samples.tree(8000, forks=2, length=4, radius=0.2, seed=3)
@@ -135,54 +121,11 @@ class TestModels:
         assert "scan" in out
         call("models", tmp_path / "scan.ply", code=2)
 
-
-class TestCommands:
-    def test_curves(self, call, tmp_path):
-        page = tmp_path / "page.md"
-        page.write_text("before\n<!-- trees -->\n<!-- end -->\n<!-- trees of a folder -->\n<!-- end -->\nafter\n")
-        out = call("curves", "--trees", 1, "--tool", "levels", "--jobs", 0, "-o", tmp_path / "t.json", "--page", page)
-        rows = json.loads((tmp_path / "t.json").read_text())["rows"]
-        assert [row["condition"] for row in rows] == ["clean", "noise", "missing", "uneven"]
-        assert all((row["components"], row["loops"]) == (1, 0) for row in rows)
-        assert "4/4" in out
-        assert "geodesic level sets" in page.read_text().split("<!-- trees of a folder -->")[0]
-
-    def test_a_folder_whose_trees_grow_along_y(self, call, parts, tmp_path):
-        points, nodes, edges = parts.builtin(0, "clean")
-        back = [1, 2, 0]
-        np.savez(tmp_path / "one.npz", nodes=nodes[:, back], edges=edges, clean=points[:, back])
-        out = call("curves", tmp_path, "--up", "y", "--tool", "levels", "--jobs", 0, "-o", tmp_path / "t.json")
-        (row,) = json.loads((tmp_path / "t.json").read_text())["rows"]
-        assert row["f1"] > 0.9
-        assert "1/1" in out
-
-    def test_refuses(self, call, tmp_path):
-        for wrong in (("--up", "w"), ("--tool", "nothing"), (tmp_path, "--tool", "levels")):
-            call("curves", *wrong, code=2)
-
-    def test_measures(self, call, tmp_path):
-        out = call("measures", "--trees", 1, "--jobs", 0, "-o", tmp_path / "m.json")
-        rows = json.loads((tmp_path / "m.json").read_text())["rows"]
-        assert [row["condition"] for row in rows] == ["clean", "lidar"]
-        assert all(abs(row["volume"]) < 0.05 for row in rows)
-        assert "clean: stem diameter" in out
-
-    def test_stems(self, call, parts, tmp_path):
-        out = call("stems", "--trees", 1, "--jobs", 0, "-o", tmp_path / "s.json")
-        rows = json.loads((tmp_path / "s.json").read_text())["rows"]
-        assert [(row["seeds"], row["tree"]) for row in rows] == [("chosen", 0), ("other", 100)]
-        assert all(abs(row["stem_diameter"] / row["true_diameter"] - 1) < 0.03 for row in rows)
-        assert "other seeds, all" in out
-        (_, _, (line, *_)), (_, header, (*_, last)) = parts.stem_tables([rows[0], rows[1] | dict(failure="no")])
-        assert line[1:4] == ["1", "1", "1"]
-        assert len(last) == len(header)
-        assert last[-1] == "no"
-
     def test_large(self, parts, tmp_path):
-        np.save(tmp_path / "scan.npy", samples.tree(2000, forks=2, cameras=parts.CAMERAS).points)
+        np.save(tmp_path / "scan.npy", samples.tree(2000, forks=2, cameras=parts.trees.CAMERAS).points)
         facts = dict(n=2000, pipeline="default, untraced")
-        ((_, header, (line, failed)),) = parts.large_tables(
-            [facts | parts.once(tmp_path / "scan.npy", facts["pipeline"]), facts | dict(failure="ValueError: no")]
+        ((_, header, (line, failed)),) = parts.trees.large_tables(
+            [facts | parts.trees.once(tmp_path / "scan.npy", facts["pipeline"]), facts | dict(failure="ValueError: no")]
         )
         assert dict(zip(header, line, strict=True))["traced"] == "0"
         assert failed == ["default, untraced", "2000", *"-" * 7, "ValueError: no"]

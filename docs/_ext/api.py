@@ -39,7 +39,7 @@ NAMES = {
     },
     "pipelines": {
         "Joining filters": ("Pipeline", "Filter"),
-        "What runs through them": ("Cloud", "Points", "Contraction", "annotate_contraction"),
+        "What runs through them": ("Cloud", "Points", "Contraction"),
     },
     "named_pipelines": {
         "To work with": ("default", "tree"),
@@ -53,7 +53,7 @@ NAMES = {
         "As Open3D's and pymeshlab's": ("to_line_set", "to_tensor_line_set", "to_tubes", "to_pymeshlab", "annotate"),
         "Clouds": ("read_cloud", "read_tensor_cloud", "read_sample", "save_tensor_cloud", "annotate_file"),
         "Skeletons": ("read_skeleton", "save_skeleton", "read_truth"),
-        "For other programs": ("save_cylinders", "save_rig", "save_mesh"),
+        "For other programs": ("save_rig", "save_mesh"),
     },
     "viewing": {
         "Pictures and pages": ("plot_skeleton", "save_preview", "save_report"),

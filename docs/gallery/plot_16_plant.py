@@ -68,17 +68,12 @@ for row, height, length in zip(leaves, HEIGHTS, LENGTHS, strict=True):
 
 # %%
 # Lengths are good to 2 %, heights to a centimetre; the angle is that of the leaf's first few centimetres, in which it
-# has begun to bend. What no skeleton tells is how wide a leaf is. The rooted plant goes on as a list of nodes that
-# TomatoWUR and pandas read, ``+`` where a leaf leaves the stem; ``table.to_csv("leaves.csv")`` has the measures.
+# has begun to bend. What no skeleton tells is how wide a leaf is. The rooted plant goes on as SWC, a list of nodes and
+# their parents; ``table.to_csv("leaves.csv")`` has the measures.
 
 with TemporaryDirectory() as folder:
-    glsk.save_skeleton(plant, f"{folder}/maize.plant.csv")
-    nodes = Path(folder, "maize.plant.csv").read_text().splitlines()
-print(
-    *nodes[:3],
-    f"{sum(',+,' in line for line in nodes)} of {len(nodes) - 1} nodes begin a leaf",
-    sep="\n",
-)
+    glsk.save_skeleton(plant, f"{folder}/maize.swc")
+    print(*Path(folder, "maize.swc").read_text().splitlines()[:3], sep="\n")
 
 figure = plt.figure(figsize=(10, 6), layout="constrained")
 left, right = (figure.add_subplot(1, 2, place, projection="3d") for place in (1, 2))

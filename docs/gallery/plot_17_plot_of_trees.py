@@ -74,13 +74,11 @@ print(
 )
 
 # %%
-# Cylinders: our own table, rTwig's and TreeQSM's, treetools'. And the tree's points with class, number, branch and
-# radius.
+# A table of cylinders, and the tree's points with class, number, branch and radius.
 
 table = glsk.analysis.cylinders(tree)
-for name in ("tree.csv", "tree.qsm.csv", "tree.mat", "trees.txt"):
-    glsk.save_cylinders(table, Path(folder.name, name), unit="m")
-print(f"{len(table)} cylinders;", Path(folder.name, "tree.qsm.csv").read_text().splitlines()[0])
+table.to_csv(Path(folder.name, "tree.csv"))
+print(f"{len(table)} cylinders;", Path(folder.name, "tree.csv").read_text().splitlines()[0])
 marked = glsk.annotate(tree, cloud, color="branch")
 print(*sorted(marked.point))
 

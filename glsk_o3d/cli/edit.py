@@ -75,7 +75,7 @@ def convert(
 def rig(
     skeleton: SkeletonFile,
     mesh: Annotated[Path | None, argument("MESH", "A mesh or a cloud; by default the skeleton's tubes.")] = None,
-    output: Annotated[list[Path] | None, output_option("FILE", "The rig: glb, gltf, or bvh without surface.")] = None,
+    output: Annotated[list[Path] | None, output_option("FILE", "The rig: glb, or bvh without surface.")] = None,
     root: Annotated[Any, root_option("Which joint moves all others")] = None,
     cut_loops: Annotated[bool, Option("--cut-loops", help="Cut loops open; the surface stays whole.")] = False,
     up: Annotated[str, option("AXIS", "Which axis of the data points up: z or y.")] = "z",

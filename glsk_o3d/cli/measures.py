@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -46,10 +45,7 @@ def branches(
 
 def tree(
     skeleton: Annotated[Path, argument("SKELETON", "Of a tree, with radii: 'glsk skeletonize --pipeline tree'.")],
-    output: Annotated[
-        list[Path] | None,
-        output_option("FILE", "Write cylinders: csv, or in metres qsm.csv (rTwig), mat (TreeQSM), txt (treetools)."),
-    ] = None,
+    output: Annotated[list[Path] | None, output_option("FILE", "Write cylinders, as csv.")] = None,
     root: Root = None,
     up: Annotated[str | None, option("AXIS", "What points up, x to -z; else as it was grown, or z.")] = None,
     unit: Annotated[str, option("UNIT", "One unit of the file: m, cm, mm, in or ft, or its metres.")] = "m",
@@ -62,12 +58,10 @@ def tree(
     JSON and npz files say where the tree grows from, and keep the points that the stem's diameter is measured on. All
     is in metres if --unit says what a unit of the file is; only a csv file of cylinders is in the units of the file.
     """
-    from .. import read_skeleton, save_cylinders
-    from ..analysis import cylinders, tree_measures
-    from ..io.cylinders import CYLINDER_ENDINGS
+    from .. import read_skeleton
+    from ..analysis import Cylinders, cylinders, tree_measures
 
-    save = partial(save_cylinders, unit=unit)
-    outputs = [Output(path, CYLINDER_ENDINGS, "file is a table of cylinders", save) for path in output or []]
+    outputs = [Output(path, (".csv",), "file is a table of cylinders", Cylinders.to_csv) for path in output or []]
     check_outputs(outputs, skeleton)
     curve = read_skeleton(skeleton)
     measures = tree_measures(curve, root, up=up, unit=unit)

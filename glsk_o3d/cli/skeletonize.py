@@ -31,9 +31,7 @@ def skeletonize(
     root: Annotated[
         str | None, option("ROOT", "Grow one tree from there: x to -z, lowest along an axis, thickest, or x,y,z.")
     ] = None,
-    tubes: Annotated[
-        Path | None, option("MESH", "Also write tubes as thick as the object: ply, obj, off, stl, glb or gltf.")
-    ] = None,
+    tubes: Annotated[Path | None, option("MESH", "Also write tubes as thick as the object: ply or obj.")] = None,
     labelled: Annotated[
         Path | None, option("CLOUD", "Also write the scan with branch, radius, ... of every point, as ply.")
     ] = None,
@@ -54,7 +52,8 @@ def skeletonize(
     from .. import ContractionRecorder, annotate_file, read_cloud, recipes, save_mesh, to_tubes
     from ..interop.packages import require
     from ..io.meshes import WRITTEN_MESH_ENDINGS
-    from ..io.streaming import STREAMED_ENDING, sample_for
+    from ..io.scans import WRITTEN_CLOUD_ENDING
+    from ..io.streaming import sample_for
     from ..resampling import with_support
     from .overrides import choose, grown_from
 
@@ -69,7 +68,7 @@ def skeletonize(
     results = [
         *skeleton_outputs(output, preview, report, title=scan.name, cut_loops=cut_loops, recorder=recorder),
         Output(tubes, WRITTEN_MESH_ENDINGS, "tubes are a mesh", lambda it, path: save_mesh(to_tubes(it), path)),
-        Output(labelled, (STREAMED_ENDING,), "file is a cloud with labels", label),
+        Output(labelled, (WRITTEN_CLOUD_ENDING,), "cloud with labels is PLY", label),
     ]
     if all(result.path is None for result in results):
         raise WrongUsage("nothing to write: give -o, --tubes or --labelled, a --preview or a --report")

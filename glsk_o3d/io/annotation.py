@@ -5,20 +5,17 @@ from typing import Any
 import numpy as np
 
 from ..analysis.branches import branch_table
-from ..analysis.segmentation import branch_of_point, label_of_nearest, thickness_of_points, vertex_of_cloud
-from ..interop.clouds import cloud_points, open3d_class
+from ..analysis.segmentation import branch_of_point, thickness_of_points, vertex_of_cloud
+from ..interop.clouds import open3d_class
 from ..interop.packages import import_open3d
 from ..skeleton import Skeleton
-from ..state import Contraction
 from .colors import ColorChoice, shades, thickness_shades
-
-__all__ = ["annotate", "annotate_contraction"]
 
 
 def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None = None) -> Any:
     """A copy of a cloud with the vertex, branch and radius of every point.
 
-    The copy has all attributes of the original, and
+    Beside the attributes of the original it has
 
     - ``skeleton_vertex`` (N, 1) int32: the vertex it belongs to, as in `Skeleton.vertex_of_point`;
     - ``branch`` (N, 1) int32: the row of `glsk_o3d.analysis.branch_table`, as from `glsk_o3d.analysis.segment`;
@@ -51,10 +48,6 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
         The skeleton is empty, or the colour is unknown.
     MissingPackageError
 
-    Notes
-    -----
-    ``voxel_down_sample`` averages attributes, which is wrong for labels. Annotate its result again.
-
     Examples
     --------
     >>> from glsk_o3d import skeletonize
@@ -65,7 +58,23 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
     """
     points, vertex = vertex_of_cloud(skeleton, cloud)
     found = labels(skeleton, points, vertex, thickness_of_points(skeleton, points, vertex), color)
-    return _annotated(points if cloud is None else cloud, found)
+    cloud = points if cloud is None else cloud
+    o3d = import_open3d()
+    name, tensor = open3d_class(cloud)
+    if name in ("PointCloud", "TriangleMesh"):
+        kind = getattr(o3d.t.geometry, name)
+        geometry = cloud.clone() if tensor else kind.from_legacy(cloud, o3d.core.float64)
+    else:
+        array = cloud.cpu().numpy() if name == "Tensor" else np.asarray(cloud)
+        array = np.array(array, np.float32 if array.dtype == np.float32 else np.float64, order="C")
+        geometry = o3d.t.geometry.PointCloud(o3d.core.Tensor(array))
+    held = geometry.vertex if name == "TriangleMesh" else geometry.point
+    positions = held.positions
+    own = positions.dtype if positions.dtype in (o3d.core.float32, o3d.core.float64) else o3d.core.float64
+    for key, values in found.items():
+        values = np.ascontiguousarray(values).reshape(len(values), -1)
+        held[key] = o3d.core.Tensor(values, own if values.dtype.kind == "f" else None, positions.device)
+    return geometry
 
 
 def labels(
@@ -86,57 +95,3 @@ def labels(
         colors = thickness_shades(thickness) if thick else shades(skeleton, color, branch, vertex)
         found["colors"] = np.round(255 * colors).astype(np.uint8)
     return found
-
-
-def annotate_contraction(state: Contraction, cloud: Any = None) -> Any:
-    """A copy of a cloud with the attribute ``contracted`` (N, 3), the contracted position of every point.
-
-    Parameters
-    ----------
-    state : Contraction
-    cloud : cloud, optional
-        As for `glsk_o3d.annotate`.
-
-    Returns
-    -------
-    open3d.t.geometry.PointCloud or TriangleMesh
-        As from there. Points that were merged away have the position of the one they were merged into; NaN for points
-        that are not finite.
-
-    Raises
-    ------
-    InvalidCloudError
-    MissingPackageError
-
-    Examples
-    --------
-    >>> from glsk_o3d import Contractor, RingBuilder
-    >>> from glsk_o3d.samples import torus
-    >>> state = (RingBuilder() | Contractor())(torus(500).points)
-    >>> annotate_contraction(state).point.contracted.shape
-    SizeVector[500, 3]
-    """
-    points = state.points if cloud is None else cloud_points(cloud)
-    survivor = label_of_nearest(state.points, state.survivor_of_point, points)
-    places = np.where((survivor >= 0)[:, None], state.contracted[survivor], np.nan)
-    return _annotated(points if cloud is None else cloud, {"contracted": places})
-
-
-def _annotated(cloud: Any, attributes: dict[str, np.ndarray]) -> Any:
-    """A tensor geometry with its own copy of all data, and attributes; floats become what its positions are."""
-    o3d = import_open3d()
-    name, tensor = open3d_class(cloud)
-    if name in ("PointCloud", "TriangleMesh"):
-        kind = getattr(o3d.t.geometry, name)
-        geometry = cloud.clone() if tensor else kind.from_legacy(cloud, o3d.core.float64)
-    else:
-        array = cloud.cpu().numpy() if name == "Tensor" else np.asarray(cloud)
-        array = np.array(array, np.float32 if array.dtype == np.float32 else np.float64, order="C")
-        geometry = o3d.t.geometry.PointCloud(o3d.core.Tensor(array))
-    held = geometry.vertex if name == "TriangleMesh" else geometry.point
-    positions = held.positions
-    own = positions.dtype if positions.dtype in (o3d.core.float32, o3d.core.float64) else o3d.core.float64
-    for key, values in attributes.items():
-        values = np.ascontiguousarray(values).reshape(len(values), -1)
-        held[key] = o3d.core.Tensor(values, own if values.dtype.kind == "f" else None, positions.device)
-    return geometry

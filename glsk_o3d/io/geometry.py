@@ -57,9 +57,8 @@ def to_tensor_line_set(skeleton: Skeleton, color: ColorChoice | None = None) -> 
     Returns
     -------
     open3d.t.geometry.LineSet
-        With ``point.positions`` (M, 3), ``point.radius``, ``point.confidence``, ``point.half_width``,
-        ``point.half_thickness`` and ``point.support`` (M, 1) float64, ``line.indices`` (E, 2) int64, ``line.branch``
-        (E, 1) int32 and, with a color, ``line.colors`` (E, 3) float64.
+        With ``point.radius``, ``point.confidence``, ``point.half_width``, ``point.half_thickness`` and
+        ``point.support`` (M, 1) float64, ``line.branch`` (E, 1) int32 and, with a color, ``line.colors``.
 
     Raises
     ------
@@ -74,27 +73,22 @@ def to_tensor_line_set(skeleton: Skeleton, color: ColorChoice | None = None) -> 
     True
     """
     o3d, branch = import_open3d(), branch_of_edge(skeleton)
-    lines = o3d.t.geometry.LineSet()
-
-    def put(where: Any, name: str, values: np.ndarray, dtype: type, columns: int = 1) -> None:
-        where[name] = o3d.core.Tensor(np.ascontiguousarray(values, dtype).reshape(-1, columns))
-
-    put(lines.point, "positions", skeleton.vertices, float, 3)
+    lines = o3d.t.geometry.LineSet(o3d.core.Tensor(skeleton.vertices), o3d.core.Tensor(skeleton.edges))
     for name, field in zip(("radius", *OF_VERTICES[1:]), OF_VERTICES, strict=True):
-        put(lines.point, name, getattr(skeleton, field), float)
-    put(lines.line, "indices", skeleton.edges, np.int64, 2)
-    put(lines.line, "branch", branch, np.int32)
+        lines.point[name] = o3d.core.Tensor(getattr(skeleton, field)[:, None])
+    lines.line["branch"] = o3d.core.Tensor(branch.astype(np.int32)[:, None])
     if color is not None:
-        put(lines.line, "colors", shades(skeleton, color, branch, skeleton.edges), float, 3)
+        shown = shades(skeleton, color, branch, skeleton.edges)
+        lines.line["colors"] = o3d.core.Tensor(np.ascontiguousarray(shown).reshape(-1, 3))
     return lines
 
 
 def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float | None = None, sides: int = 16) -> Any:
     """A skeleton as a mesh of tubes, one for every branch, closed by half balls.
 
-    The tubes have the sections of the vertices, linear between them: ellipses with their half axes, or circles with
-    their radius if the skeleton has no points to determine the direction of the width. They overlap at junctions, where
-    round half balls form one ball. The cross-sections do not twist along the curve.
+    Their sections are ellipses with the half axes of the vertices, or circles with their radius if the skeleton has no
+    points to determine the direction of the width. They are linear between vertices, do not twist, and overlap at
+    junctions.
 
     Parameters
     ----------
@@ -110,8 +104,7 @@ def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float
     Returns
     -------
     open3d.geometry.TriangleMesh
-        With vertex colours and normals; triangles face outwards. ``open3d.t.geometry.TriangleMesh.from_legacy`` makes a
-        tensor mesh of it.
+        With vertex colours and normals; triangles face outwards.
 
     Raises
     ------

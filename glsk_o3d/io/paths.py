@@ -55,10 +55,10 @@ def check_promised(promised: int, held: int, what: str = "points") -> None:
         raise ValueError(f"it promises {promised} {what} and holds {max(held, 0)}: it is truncated")
 
 
-def check_budget(taken: int, size: int, times: int = MOST_EXPANDED) -> None:
+def check_budget(taken: int, size: int) -> None:
     """Raise ValueError where the content of so many bytes would take too many: it is packed, or repeats itself."""
-    if taken > (most := max(times * size, ALWAYS_TAKEN)):
-        raise ValueError(f"its {size} bytes would take {taken}, and at most {most} are allowed, {times} times as many")
+    if taken > (most := max(MOST_EXPANDED * size, ALWAYS_TAKEN)):
+        raise ValueError(f"its {size} bytes would take {taken}, and at most {most} are allowed")
 
 
 def check_line(line: bytes) -> None:

@@ -6,9 +6,8 @@ import ast
 import operator
 import re
 import sys
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from keyword import iskeyword
 from typing import Any
@@ -38,20 +37,20 @@ class Scan:
     attributes: Mapping[str, np.ndarray] = field(default_factory=dict)  # all else; names can stand in an expression
     triangles: np.ndarray = field(default_factory=lambda: NO_TRIANGLES)  # between the points, if it is a mesh
     unset: frozenset[str] = frozenset()  # attributes that nobody gave: conditions may name them, results leave them out
-    types: Mapping[str, np.dtype] = field(default_factory=dict)  # of its columns in a binary PLY file
+    single: bool = False  # the file has its places as float32
 
     def __len__(self) -> int:
         return len(self.positions)
 
     def __getitem__(self, rows: np.ndarray) -> Scan:
         """Some of the points, without triangles."""
-        return Scan(
-            self.positions[rows],
-            None if self.colors is None else self.colors[rows],
-            None if self.normals is None else self.normals[rows],
-            {name: values[rows] for name, values in self.attributes.items()},
-            unset=self.unset,
-            types=self.types,
+        return replace(
+            self,
+            positions=self.positions[rows],
+            colors=None if self.colors is None else self.colors[rows],
+            normals=None if self.normals is None else self.normals[rows],
+            attributes={name: values[rows] for name, values in self.attributes.items()},
+            triangles=NO_TRIANGLES,
         )
 
     def chosen(self, where: str) -> np.ndarray:
@@ -76,15 +75,6 @@ class Scan:
         return {name: values for name, values in self.attributes.items() if name not in self.unset}
 
     @property
-    def kinds(self) -> dict[str, np.dtype]:
-        """As what Open3D's clouds have the given attributes: int32, since Open3D writes no int64, or floats."""
-        found = {}
-        for name, values in self.given.items():
-            whole = values.dtype.kind in "iub" and np.abs(values.astype(float)).max(initial=0) < 2**31
-            found[name] = np.dtype(np.int32 if whole else values.dtype if values.dtype == np.float32 else float)
-        return found
-
-    @property
     def shades(self) -> np.ndarray | None:
         """The colours from 0 to 255, (N, 3) uint8 array or None."""
         return None if self.colors is None else np.round(255 * np.clip(self.colors, 0, 1)).astype(np.uint8)
@@ -107,8 +97,10 @@ class Scan:
             cloud.point.colors = o3d.core.Tensor(shades)
         if self.normals is not None:
             cloud.point.normals = o3d.core.Tensor(np.ascontiguousarray(self.normals, float))
-        for name, kind in self.kinds.items():
-            cloud.point[name] = o3d.core.Tensor(np.ascontiguousarray(self.attributes[name][:, None], kind))
+        for name, values in self.given.items():  # integers as int32 if they fit: Open3D writes no int64
+            whole = values.dtype.kind in "iub" and np.abs(values.astype(float)).max(initial=0) < 2**31
+            kind = np.int32 if whole else np.float32 if values.dtype == np.float32 else float
+            cloud.point[name] = o3d.core.Tensor(np.ascontiguousarray(values[:, None], kind))
         return cloud
 
 
@@ -167,35 +159,44 @@ def _value(node: ast.AST, columns: Mapping[str, np.ndarray]) -> Any:
     raise InvalidParameterError(f"{ast.unparse(node)!r} is not understood: compare attributes with numbers")
 
 
-# ------------------------------------------------------------------------------------------------- what readers need
+def scan_of(columns: Mapping[str, np.ndarray], top: float | None = None, unset: bool = False) -> Scan:
+    """Points of columns, (N,) arrays by name: places, colours and normals by their names, all else are attributes, by
+    names that can stand in an expression, such as ``class_``, ``Scalar_field`` and ``column_7``.
 
+    Colours are numbers up to 255 or 65535, or up to 1 if they are no integers; `top` is the brightest in the file if
+    these are only some of its points. What is 0 throughout can be made `unset`.
+    """
+    left = dict(columns)
 
-def named_attributes(columns: Iterable[tuple[str, np.ndarray]]) -> dict[str, np.ndarray]:
-    """Columns by names that can stand in an expression, each its own: ``class_``, ``Scalar_field_2``, ``column_7``."""
-    found: dict[str, np.ndarray] = {}
-    taken, repeated = {"x", "y", "z", "positions", "colors", "normals"}, Counter[str]()
-    for text, values in columns:
+    def together(names: list[str]) -> np.ndarray | None:
+        if not set(names) <= left.keys():
+            return None
+        return np.column_stack([left.pop(name) for name in names])
+
+    positions, colors, normals = (together(names) for names in ([*"xyz"], COLOR_CHANNELS, NORMAL_NAMES))
+    if positions is None:
+        raise ValueError("it has no x, y and z")
+    if colors is not None:
+        top = brightest(colors) if top is None else top
+        scale = 1 if top <= 1 and colors.dtype.kind == "f" else 255 if top <= 255 else 65535
+        colors = colors / scale if top or not unset else None
+    attributes: dict[str, np.ndarray] = {}
+    for text, values in left.items():
         name = re.sub(r"\W+", "_", text).strip("_") or "column"
         name = f"column_{name}" if name[0].isdigit() else f"{name}_" if iskeyword(name) else name
-        unique = name
-        while unique in taken:
-            repeated[name] += 1
-            unique = f"{name}_{repeated[name] + 1}"
-        taken.add(unique)
-        found[unique] = values
-    return found
+        while name in {*"xyz", "positions", "colors", "normals", *attributes}:
+            name += "_2"
+        attributes[name] = values.astype(values.dtype.newbyteorder("="))
+    return Scan(
+        np.ascontiguousarray(positions, float),
+        colors,
+        None if normals is None else np.ascontiguousarray(normals, float),
+        attributes,
+        unset=frozenset(name for name, values in attributes.items() if unset and not values.any()),
+        single=columns["x"].dtype.str[1:] == "f4",
+    )
 
 
 def brightest(values: np.ndarray) -> float:
     """The largest number among colours, at least 0; NaN is none."""
     return float(np.fmax.reduce(values, axis=None, initial=0))
-
-
-def unit_colors(values: np.ndarray, top: float | None = None) -> np.ndarray:
-    """Colours from 0 to 1, of numbers up to 255 or 65535, or up to 1 if they are no integers.
-
-    `top` is the brightest of all, where these are only some.
-    """
-    top = brightest(values) if top is None else top
-    scale = 1 if top <= 1 and values.dtype.kind == "f" else 255 if top <= 255 else 65535
-    return np.asarray(values, float) / scale

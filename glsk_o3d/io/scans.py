@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError, MissingPackageError, brief
-from ..interop.atomic import write_atomically
+from ..errors import FileFormatError, InvalidCloudError, MissingPackageError, brief
+from ..interop.atomic import check_ending, write_atomically
 from ..interop.packages import import_open3d
 from . import meshes
 from .formats import pcd, ply, scanners, text_tables
@@ -19,8 +19,7 @@ from .paths import MESH_ENDINGS, SCAN_ENDINGS, TEXT_ENDINGS, existing_file, unkn
 from .scan import ALL_ROWS, NoPoints, Scan, parsed
 from .skeletons import holds_skeleton
 
-WRITTEN_CLOUD_ENDINGS = (".ply", ".pcd", ".npz")
-"""Files that hold all attributes of a tensor cloud."""
+WRITTEN_CLOUD_ENDING = ".ply"
 BLOCK_ROWS = 1_000_000  # measured: larger blocks are not read faster, and take more memory
 _log = logging.getLogger(__name__)
 
@@ -47,8 +46,7 @@ _SCAN_READERS: dict[str, Reader] = {
 def read_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
     """Read a point cloud, or the vertices of a mesh.
 
-    Unreadable and truncated files are errors; Open3D returns an empty cloud or uninitialised points for them. All
-    coordinates keep their digits. A warning is logged for a mesh with large triangles, whose vertices describe the
+    All coordinates keep their digits. A warning is logged for a mesh with large triangles, whose vertices describe the
     surface badly.
 
     Parameters
@@ -57,8 +55,8 @@ def read_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
         PLY, PCD, CSV, TXT, ASC, XYZ, XYZN, XYZRGB, PTS; LAS and LAZ (extra ``las``), E57 (extra ``e57``); or a mesh
         with triangles as OFF, OBJ, STL, glTF or GLB. In text, lines that hold no point are skipped and logged.
     where : str, optional
-        Only points for which this holds: comparisons of attributes, ``x``, ``y`` and ``z`` with numbers or each other,
-        joined by ``and``, ``or`` and ``not``, such as ``"classification == 5 and not 0 < z < 2"``.
+        Only points for which this holds, such as ``"classification == 5 and not 0 < z < 2"``: attributes and places,
+        compared with numbers or each other.
 
     Returns
     -------
@@ -83,34 +81,33 @@ def read_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
     >>> with TemporaryDirectory() as folder:
     ...     path = Path(folder, "scan.csv")
     ...     _ = path.write_text("x,y,z,label\\n0,0,0,1\\n0,0,1,2\\n0,1,1,2\\n")
-    ...     len(read_cloud(path).points), len(read_cloud(path, where="label == 2").points)
-    (3, 2)
+    ...     len(read_cloud(path, where="label == 2").points)
+    2
     """
     return read_scan(path, where).to_legacy()
 
 
 def read_tensor_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
-    """Read a cloud as `read_cloud` does, with all attributes of its points.
+    """Read a cloud with all attributes of its points.
 
     Parameters
     ----------
     path, where
-        As for `read_cloud`, which has the errors, too.
+        As for `read_cloud`, which has the same errors.
 
     Returns
     -------
     open3d.t.geometry.PointCloud
-        Positions are float64. Attributes have the names of the file, such as ``intensity`` and ``classification``, with
-        an underscore for characters that expressions do not allow. `glsk_o3d.annotate` keeps them.
+        Positions are float64. Attributes have the names of the file, with an underscore for characters that expressions
+        do not allow.
 
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
-    ...     path = Path(folder, "scan.csv")
-    ...     _ = path.write_text("x,y,z,label\\n0,0,0,1\\n0,0,1,2\\n0,1,1,2\\n")
-    ...     read_tensor_cloud(path).point.label.flatten().numpy()
-    array([1, 2, 2], dtype=int32)
+    ...     _ = Path(folder, "scan.csv").write_text("x,y,z,label\\n0,0,0,1\\n0,0,1,2\\n")
+    ...     read_tensor_cloud(f"{folder}/scan.csv").point.label.flatten().numpy()
+    array([1, 2], dtype=int32)
     """
     return read_scan(path, where).to_tensor()
 
@@ -158,9 +155,6 @@ def read_mesh(path: str | os.PathLike) -> Any:
     return mesh
 
 
-# -------------------------------------------------------------------------------------------------------------- blocks
-
-
 def read_blocks(
     path: str | os.PathLike, *, rows: int = BLOCK_ROWS, where: str | None = None, bare: bool = False
 ) -> Iterator[Scan]:
@@ -171,8 +165,6 @@ def read_blocks(
     have fewer points, and there is none without. Errors are those of `read_cloud`, before the first block where the
     size of the file shows that it is truncated.
     """
-    if isinstance(rows, bool) or not isinstance(rows, int) or rows < 1:
-        raise InvalidParameterError(f"rows = {rows!r}: must be an int of at least 1")
     if where is not None:
         parsed(where)
     path = _scan_file(path)
@@ -236,56 +228,31 @@ def _chosen(path: Path, blocks: Iterator[Scan], where: str | None) -> Iterator[S
         raise InvalidCloudError(f"there is no point with {where}")
 
 
-# ------------------------------------------------------------------------------------------------------------- writing
-
-
 def save_tensor_cloud(cloud: Any, path: str | os.PathLike) -> None:
-    """Write a tensor cloud with all its attributes and all digits; `read_tensor_cloud` reads PLY and PCD again.
+    """Write a tensor cloud with all its attributes and all digits, as PLY, which Open3D and `read_tensor_cloud` read.
+
+    Colours become bytes, integers int32 or else doubles, and an attribute of several columns as many properties.
 
     Parameters
     ----------
     cloud : open3d.t.geometry.PointCloud
     path : path-like
-        PLY, PCD or npz; it appears complete or not at all.
+        Ends in ``.ply``; it appears complete or not at all.
 
     Raises
     ------
     FileFormatError
-        The ending is unknown.
+        The ending is another.
     OSError
         The folder does not exist, or the file cannot be written.
 
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
-    >>> from glsk_o3d import annotate, skeletonize
-    >>> from glsk_o3d.samples import torus
-    >>> marked = annotate(skeletonize(torus(1000).points))
+    >>> cloud = import_open3d().t.geometry.PointCloud(np.eye(3))
     >>> with TemporaryDirectory() as folder:
-    ...     save_tensor_cloud(marked, f"{folder}/marked.ply")
-    ...     bool((read_tensor_cloud(f"{folder}/marked.ply").point.radius == marked.point.radius).all())
-    True
+    ...     save_tensor_cloud(cloud, f"{folder}/cloud.ply")
     """
-    ending = Path(path).suffix.lower()
-    if ending not in WRITTEN_CLOUD_ENDINGS:
-        raise unknown_ending(f"{os.fspath(path)}: a cloud with labels", WRITTEN_CLOUD_ENDINGS)
-    o3d = import_open3d()
-
-    def write(temporary: Path) -> None:
-        if ending == ".npz":  # where the disk is full, Open3D's own writer ends the process
-            np.savez(temporary, **{name: cloud.point[name].cpu().numpy() for name in cloud.point})
-            return
-        written = cloud
-        if ending == ".pcd" and "normals" in cloud.point:  # Open3D's header has the type of the positions for both
-            written = cloud.clone()
-            written.point.normals = cloud.point.normals.to(cloud.point.positions.dtype)
-        with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-            done = o3d.t.io.write_point_cloud(str(temporary), written)
-        try:  # whether it is whole, which Open3D does not say
-            _SCAN_READERS[ending](temporary, BLOCK_ROWS, True)
-        except ValueError:
-            done = False
-        if not done:
-            raise OSError("Open3D could not write all of it: is the disk full?")
-
-    write_atomically(path, write)
+    check_ending(path, "cloud with labels is PLY", WRITTEN_CLOUD_ENDING)
+    data = ply.content(ply.columns_of({name: cloud.point[name].cpu().numpy() for name in cloud.point}))
+    write_atomically(path, lambda temporary: temporary.write_bytes(data))

@@ -12,7 +12,7 @@ from ..interop.atomic import write_atomically
 from ..interop.packages import require_for
 from ..refinement.rooted import RootPlace
 from ..skeleton import Skeleton
-from .formats import fields, gltf, lines, plants, ply, urdf
+from .formats import fields, gltf, lines, ply, trees
 from .formats.graphs import NoEdges, as_forest, holding_all
 from .paths import SCAN_ENDINGS, existing_file, unknown_ending
 
@@ -32,22 +32,17 @@ FORMATS: dict[str, Format] = {
     ".obj": Format(lines.write_obj, lines.read_obj),
     ".json": Format(fields.write_json, fields.read_json),
     ".npz": Format(fields.write_npz, fields.read_npz),
-    ".swc": Format(plants.write_swc, plants.read_swc, trees=True),
+    ".swc": Format(trees.write_swc, trees.read_swc, trees=True),
     ".graphml": Format(lines.write_graphml, lines.read_graphml),
     ".cgal": Format(lines.write_cgal, lines.read_cgal),
-    ".polylines.txt": Format(lines.write_cgal, lines.read_cgal),
     ".vtp": Format(lines.write_vtp),
-    ".dxf": Format(lines.write_dxf),
     ".glb": Format(gltf.write, trees=True),
-    ".mtg": Format(plants.write_mtg, trees=True),
-    ".plant.csv": Format(plants.write_csv, trees=True),
-    ".urdf": Format(urdf.write, trees=True),
+    ".urdf": Format(trees.write_urdf, trees=True),
 }
 """The formats of skeletons by the ending of the file."""
 READABLE = tuple(ending for ending, format in FORMATS.items() if format.read is not None)
 """Endings of files that `read_skeleton` reads."""
 _HOLDS_LINES = {".ply": ply.holds_lines, ".obj": lines.holds_lines}  # formats that scans have, too
-_OWN = tuple(ending for ending in FORMATS if ending.count(".") == 2)  # which end in those of scans
 
 
 def save_skeleton(
@@ -60,22 +55,19 @@ def save_skeleton(
 ) -> None:
     """Write a skeleton to a file; the ending chooses the format.
 
-    ===================== =============================================== =======================================
-    ending                holds                                           opens in
-    ===================== =============================================== =======================================
-    .json, .npz           everything, to the last bit                     `read_skeleton`
-    .ply                  vertices, edges, radii, half axes               Open3D (``read_line_set``), MeshLab
-    .obj                  vertices, edges as ``l`` lines; no radii        MeshLab, Blender, CloudCompare
-    .swc                  trees, with radii                               neuron and plant tools
-    .graphml              x, y, z, radius of nodes, length of edges       networkx, Gephi, Cytoscape
-    .cgal, .polylines.txt a line per branch: count, x y z, ...; no radii  CGAL
-    .vtp                  vertices, branches, radii, confidence           ParaView, Slicer, vmtk
-    .dxf                  branches as 3D polylines; no radii              CAD, CloudCompare, GIS
-    .glb                  trees, as an armature with a skin of tubes      Blender
-    .mtg                  plants: a node per vertex, axes, with radii     OpenAlea, TomatoWUR
-    .plant.csv            one plant: node, parent, ``<`` or ``+``, radii  TomatoWUR
-    .urdf                 trees, as a robot of cylinders and balls        ROS, simulators
-    ===================== =============================================== =======================================
+    ============ =============================================== =======================================
+    ending       holds                                           opens in
+    ============ =============================================== =======================================
+    .json, .npz  everything, to the last bit                     `read_skeleton`
+    .ply         vertices, edges, radii, half axes               Open3D (``read_line_set``), MeshLab
+    .obj         vertices, edges as ``l`` lines; no radii        MeshLab, Blender, CloudCompare
+    .swc         trees, with radii                               neuron and plant tools
+    .graphml     x, y, z, radius of nodes, length of edges       networkx, Gephi, Cytoscape
+    .cgal        a line per branch: count, x y z, ...; no radii  CGAL
+    .vtp         vertices, branches, radii, confidence           ParaView, Slicer, vmtk
+    .glb         trees, as an armature with a skin of tubes      Blender
+    .urdf        trees, as a robot of cylinders and balls        ROS, simulators
+    ============ =============================================== =======================================
 
     Formats below CGAL's are only written, not read. Numbers keep their full precision, except in glTF, which has
     float32. The file appears complete or not at all; after an error an existing file is unchanged.
@@ -87,9 +79,8 @@ def save_skeleton(
     cut_loops : bool
         For formats of trees: keep the spanning forest of least length, instead of refusing loops.
     root : str, int or (x, y, z), optional
-        For the same formats: the root, as for `glsk_o3d.editing.reroot`, from which the vertices are numbered. By
-        default vertex 0 if the numbers already go outwards from it, as from `pipelines.tree`; otherwise the root of
-        `glsk_o3d.analysis.branch_table`.
+        For the same formats: the root, as for `glsk_o3d.editing.reroot`. By default vertex 0 if the numbers go outwards
+        from it, as from `pipelines.tree`; otherwise that of `glsk_o3d.analysis.branch_table`.
     format : str, optional
         The ending of another format than that of `path`, with or without its dot.
 
@@ -147,17 +138,13 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
-    >>> from glsk_o3d import skeletonize
-    >>> from glsk_o3d.samples import torus
-    >>> skeleton = skeletonize(torus(1000).points)
     >>> with TemporaryDirectory() as folder:
-    ...     save_skeleton(skeleton, f"{folder}/ring.json")
-    ...     again = read_skeleton(f"{folder}/ring.json")
-    >>> bool((again.vertices == skeleton.vertices).all())
-    True
+    ...     _ = Path(folder, "s.obj").write_text("v 0 0 0\\nv 1 0 0\\nl 1 2\\n")
+    ...     read_skeleton(f"{folder}/s.obj").length
+    1.0
     """
     path = existing_file(path)
-    if format is None and path.name.lower().endswith(SCAN_ENDINGS) and not path.name.lower().endswith(tuple(FORMATS)):
+    if format is None and path.suffix.lower() in {*SCAN_ENDINGS} - FORMATS.keys():
         raise _is_cloud(path)
     ending = skeleton_ending(path, format)
     read = FORMATS[ending].read
@@ -178,18 +165,15 @@ def _is_cloud(path: Path) -> FileFormatError:
 
 
 def holds_skeleton(path: str | os.PathLike) -> bool:
-    """Whether a file holds a skeleton: PLY with edges or OBJ with lines, but no faces, or by the ending.
-
-    False also for what does not exist: reading it as a cloud says so.
-    """
+    """Whether a file is there and a skeleton: PLY with edges or OBJ with lines, but no faces, or by the ending."""
     path = Path(path)
-    name, ending = path.name.lower(), path.suffix.lower()
+    ending = path.suffix.lower()
     if not path.is_file():
         return False
     if ending in _HOLDS_LINES:
         with path.open("rb") as stream:
             return _HOLDS_LINES[ending](stream)
-    return ending not in SCAN_ENDINGS or name.endswith(_OWN)
+    return ending not in SCAN_ENDINGS
 
 
 def skeleton_ending(path: Path, format: str | None = None) -> str:
@@ -197,11 +181,10 @@ def skeleton_ending(path: Path, format: str | None = None) -> str:
 
     FileFormatError if there is none; the message lists them.
     """
-    name = path.name.lower() if format is None else "." + format.lower().lstrip(".")
-    for ending in FORMATS:
-        if name.endswith(ending) if format is None else name == ending:
-            return ending
-    raise unknown_ending(path if format is None else f"format {format!r}", FORMATS)
+    ending = path.suffix.lower() if format is None else "." + format.lower().lstrip(".")
+    if ending not in FORMATS:
+        raise unknown_ending(path if format is None else f"format {format!r}", FORMATS)
+    return ending
 
 
 def read_truth(path: str | os.PathLike) -> Truth:
@@ -225,14 +208,10 @@ def read_truth(path: str | os.PathLike) -> Truth:
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
-    >>> import numpy as np
-    >>> from glsk_o3d.samples import torus
-    >>> ring = torus(1000)
     >>> with TemporaryDirectory() as folder:
-    ...     np.savez(f"{folder}/ring.npz", nodes=ring.nodes, edges=ring.edges, radii=ring.radii)
-    ...     truth = read_truth(f"{folder}/ring.npz")
-    >>> len(truth.edges) == len(ring.edges)
-    True
+    ...     _ = Path(folder, "s.swc").write_text("1 0 0 0 0 0.1 -1\\n2 0 0 0 1 0.1 1\\n")
+    ...     len(read_truth(f"{folder}/s.swc").edges)
+    1
     """
     path, names = existing_file(path), ("nodes", "edges", "radii")
     try:

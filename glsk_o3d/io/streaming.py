@@ -6,27 +6,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from ..analysis.segmentation import vertex_of_cloud
+from ..analysis.segmentation import label_of_nearest, thickness_of_points, vertex_of_cloud
 from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ..interop.atomic import check_ending, write_atomically
 from ..interop.clouds import SAMPLE_COUNT
 from ..interop.packages import import_open3d
 from ..numerics.frame import not_finite
 from ..numerics.grid_sampling import sample_blocks
-from ..numerics.morton import morton_order
-from ..numerics.neighbourhoods import nearest_neighbours
 from ..pipeline import Pipeline
-from ..refinement.thin_parts import SCALE_NEIGHBOUR
 from ..sampler import Sampler
 from ..skeleton import Skeleton
 from .annotation import labels
 from .formats import ply
-from .scan import COLOR_CHANNELS, NORMAL_NAMES, Scan
-from .scans import promised_points, read_blocks
+from .scan import COLOR_CHANNELS, Scan
+from .scans import WRITTEN_CLOUD_ENDING, promised_points, read_blocks
 
-STREAMED_ENDING = ".ply"  # of files that labels are streamed to
 LARGE_CLOUD = 10_000_000  # measured: points that in memory take 2 GB, and in blocks half the time
 
 
@@ -35,16 +30,14 @@ def read_sample(
 ) -> Any:
     """Read the sample of a large scan that its skeleton needs, in memory that does not grow with the file.
 
-    `Sampler` keeps the point nearest to the mean of each cell of a grid. This function finds these points block by
-    block while reading, so the skeleton of the sample is that of the whole.
+    It has the points that `Sampler` keeps, so its skeleton is that of the whole.
 
     Parameters
     ----------
     path : path-like
         As for `read_cloud`. LAS, LAZ, PCD and binary PLY are read in blocks, other formats as a whole.
     n : int, optional
-        About how many points; all, if they are not more than twice as many. By default the number of `Sampler`: twice
-        25000 or, from 152588 points on, 128 times the square root of their number, 1.28 million of 100 million.
+        About how many points; all, if they are not more than twice as many. By default the number of `Sampler`.
     where : str, optional
         As for `read_cloud`.
     drop_invalid : bool
@@ -53,8 +46,7 @@ def read_sample(
     Returns
     -------
     open3d.t.geometry.PointCloud
-        Points of the file, float64, with the attribute ``sample_count`` (N, 1) int32: the number of points of the file
-        that each represents. Filters use it, and the commands count the points of the file.
+        float64, with the attribute ``sample_count`` (N, 1) int32, which filters use: how many points each represents.
 
     Raises
     ------
@@ -64,16 +56,12 @@ def read_sample(
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
-    >>> from glsk_o3d import annotate, save_tensor_cloud, skeletonize
     >>> from glsk_o3d.samples import torus
-    >>> whole = skeletonize(torus(120000).points)
     >>> with TemporaryDirectory() as folder:
-    ...     save_tensor_cloud(annotate(whole), f"{folder}/scan.ply")
-    ...     sample = read_sample(f"{folder}/scan.ply")
+    ...     np.savetxt(f"{folder}/scan.xyz", torus(120000).points)
+    ...     sample = read_sample(f"{folder}/scan.xyz")
     >>> len(sample.point.positions) < 60000, int(sample.point.sample_count.numpy().sum())
     (True, 120000)
-    >>> bool(np.allclose(skeletonize(sample).vertices, whole.vertices))
-    True
     """
     if n is not None and (isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1):
         raise InvalidParameterError(f"n = {n!r}: must be an int of at least 1")
@@ -147,21 +135,18 @@ def annotate_file(
 ) -> int:
     """Write a scan with labels to a file, block by block, in memory that does not grow with it.
 
-    `glsk_o3d.annotate` for files: the same attributes, coloured by branch. The scan's own colours are attributes
-    ``scan_red``, ``scan_green`` and ``scan_blue``. Attributes of a binary PLY file of the types float, double, uchar or
-    int keep them, and radius, confidence and thickness are float if the coordinates are. Other attributes become int or
-    double. ``thickness`` uses the spacing of the skeleton's points, and is NaN without them.
+    `glsk_o3d.annotate` for files: the same attributes, coloured by branch. The scan's own colours are ``scan_red``,
+    ``scan_green`` and ``scan_blue``. Attributes that PLY cannot hold become int or double; radius, confidence and
+    thickness are float if the coordinates are. ``thickness`` uses the spacing of the skeleton's points, if it has any.
 
     Parameters
     ----------
     skeleton : Skeleton
         Such as that of `read_sample`.
-    path : path-like
-        The scan, as for `read_cloud`.
+    path, where
+        As for `read_cloud`; other points are not written.
     output : path-like
         PLY; it appears complete or not at all.
-    where : str, optional
-        As for `read_cloud`: other points are not written.
 
     Returns
     -------
@@ -180,30 +165,27 @@ def annotate_file(
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
-    >>> from glsk_o3d import annotate, read_tensor_cloud, save_tensor_cloud, skeletonize
+    >>> from glsk_o3d import skeletonize
     >>> from glsk_o3d.samples import torus
-    >>> ring = skeletonize(torus(1000).points)
     >>> with TemporaryDirectory() as folder:
-    ...     save_tensor_cloud(annotate(skeletonize(torus(3000).points)), f"{folder}/scan.ply")
-    ...     annotate_file(ring, f"{folder}/scan.ply", f"{folder}/marked.ply")
-    ...     int(read_tensor_cloud(f"{folder}/marked.ply").point.skeleton_vertex.max().item()) < len(ring.vertices)
+    ...     np.savetxt(f"{folder}/scan.xyz", torus(3000).points)
+    ...     annotate_file(skeletonize(torus(1000).points), f"{folder}/scan.xyz", f"{folder}/marked.ply")
     3000
-    True
     """
-    check_ending(output, "labelled cloud of a large file is PLY", STREAMED_ENDING)
+    check_ending(output, "cloud with labels is PLY", WRITTEN_CLOUD_ENDING)
     if Path(output).exists() and Path(path).exists() and os.path.samefile(path, output):
         raise FileFormatError(f"{os.fspath(output)}: is the scan itself: give another name")
     label = _labeller(skeleton)
-    n, kinds = _survey(path, where)
+    n, names = _survey(path, where)
     changed = FileFormatError(f"{os.fspath(path)}: has changed while it was read: label it again when it is complete")
 
     def write(temporary: Path) -> None:
         written, row = 0, None
         with temporary.open("wb") as stream:
             for block in read_blocks(path, where=where):
-                if not kinds.keys() <= block.attributes.keys():
+                if not {*names} <= block.attributes.keys():
                     raise changed
-                table = ply.rows_of(_columns(block, kinds, label(block.positions)))
+                table = ply.rows_of(_columns(block, names, label(block.positions)))
                 if row is None:
                     stream.write(ply.header_of(table.dtype, n))
                 elif row != table.dtype:
@@ -221,49 +203,38 @@ def _labeller(skeleton: Skeleton) -> Callable[[np.ndarray], dict[str, np.ndarray
     """What says of points, (m, 3) float array, where they belong, coloured by branch."""
     if len(skeleton.vertices) == 0:
         raise InvalidParameterError("the skeleton is empty: there is nothing to label points with")
-    known = np.flatnonzero(skeleton.vertex_of_point >= 0)
-    points_of, owner = skeleton.points[known], skeleton.vertex_of_point[known]
-    if len(known):
-        tree = cKDTree(points_of)
-        apart = nearest_neighbours(points_of, min(SCALE_NEIGHBOUR + 1, len(known)))[0][:, -1]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            thickness_of = skeleton.radii[owner] / apart
+    known = skeleton.vertex_of_point >= 0
+    row_of_point = np.where(known, np.arange(len(known)), -1)
+    vertex_of = np.append(skeleton.vertex_of_point, -1)
+    thickness_of = np.append(thickness_of_points(skeleton, skeleton.points, skeleton.vertex_of_point), np.nan)
 
     def label(points: np.ndarray) -> dict[str, np.ndarray]:
-        vertex, thickness = np.full(len(points), -1), np.full(len(points), np.nan)
-        if not len(known):
-            vertex = vertex_of_cloud(skeleton, points)[1]
-        elif len(rows := np.flatnonzero(np.isfinite(points).all(axis=1))):
-            rows = rows[morton_order(points[rows])]  # what is near in memory is found faster
-            nearest = tree.query(points[rows])[1]
-            vertex[rows], thickness[rows] = owner[nearest], thickness_of[nearest]
+        if known.any():
+            nearest = label_of_nearest(skeleton.points, row_of_point, points)
+            vertex, thickness = vertex_of[nearest], thickness_of[nearest]
+        else:
+            vertex, thickness = vertex_of_cloud(skeleton, points)[1], np.full(len(points), np.nan)
         return labels(skeleton, points, vertex, thickness, "branch")
 
     return label
 
 
-def _survey(path: str | os.PathLike, where: str | None) -> tuple[int, dict[str, np.dtype]]:
-    """How many points there are, and of what type each attribute is that some of them have."""
-    n, names, kinds = 0, list[str](), dict[str, np.dtype]()
+def _survey(path: str | os.PathLike, where: str | None) -> tuple[int, list[str]]:
+    """How many points there are, and the names of the attributes that some of them have."""
+    n, names = 0, dict[str, None]()
     for block in read_blocks(path, where=where):
-        n, names = n + len(block), list(block.attributes)
-        for name, kind in block.kinds.items():
-            kinds[name] = np.promote_types(kinds.get(name, kind), kind)
-    return n, {name: kinds[name] for name in names if name in kinds}
+        n, names = n + len(block), names | dict.fromkeys(block.given)
+    return n, [*names]
 
 
-def _columns(block: Scan, kinds: dict[str, np.dtype], found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Columns of a PLY file, by name: those of a scan, of the types that its file holds, and labels."""
-    held = {name: kind for name, kind in block.types.items() if kind.str[1:] in ply.WRITTEN_KINDS}
-    columns = dict(zip("xyz", block.positions.T, strict=True))
+def _columns(block: Scan, names: list[str], found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Columns of a PLY file, by name: those of a scan, and labels."""
+    held = {"positions": block.positions, **{name: block.attributes[name] for name in names}, **found}
     if block.normals is not None:
-        columns |= dict(zip(NORMAL_NAMES, block.normals.T, strict=True))
-    columns |= {name: block.attributes[name].astype(kind) for name, kind in kinds.items()}
-    columns = {name: values.astype(held.get(name, values.dtype), copy=False) for name, values in columns.items()}
-    colors = found.pop("colors")
+        held["normals"] = block.normals
     if (shades := block.shades) is not None:
-        shade = np.uint8 if held.get("red") == np.uint8 else np.int32
-        columns |= {f"scan_{name}": shades[:, i].astype(shade) for i, name in enumerate(COLOR_CHANNELS)}
-    if columns["x"].dtype == np.float32:
-        found = {name: values.astype(np.float32) if values.dtype == float else values for name, values in found.items()}
-    return columns | found | dict(zip(COLOR_CHANNELS, colors.T, strict=True))
+        held |= {f"scan_{name}": shades[:, i] for i, name in enumerate(COLOR_CHANNELS)}
+    if block.single:
+        ours = {"positions", "normals", *found}
+        held |= {name: held[name].astype(np.float32) for name in ours & held.keys() if held[name].dtype == float}
+    return ply.columns_of(held)

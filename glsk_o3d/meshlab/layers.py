@@ -184,13 +184,7 @@ class Layer:
             columns |= dict(zip(COLOR_CHANNELS, shades.T, strict=True))
         if self.scalars is not None:
             columns["quality"] = np.asarray(self.scalars, float)
-        vertices, said = ply.rows_of(columns), ""
-        faces = np.empty(0 if self.faces is None else len(self.faces), [("n", "u1"), ("corners", "<i4", 3)])
-        if len(faces):
-            faces["n"], faces["corners"] = 3, self.faces
-            said = f"element face {len(faces)}\nproperty list uchar int vertex_indices\n"
-        header = ply.header_of(vertices.dtype, len(vertices), more=said)
-        path.write_bytes(header + vertices.tobytes() + faces.tobytes())
+        path.write_bytes(ply.content(columns, self.faces if self.faces is not None and len(self.faces) else None))
 
 
 def check_ending(path: Path, what: str) -> None:

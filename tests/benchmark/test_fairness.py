@@ -1,9 +1,8 @@
 """What is refused, each by a shape on either side of the border; and the paths and grids that tell it."""
 
-import networkx as nx
 import numpy as np
 import pytest
-from glsk_bench.shapes.axis import Axis, joined, subdivided
+from glsk_bench.shapes.axis import Axis, joined
 from glsk_bench.shapes.curves import polygon
 from glsk_bench.shapes.fairness import chains, fault, shortest_loop, topology
 
@@ -92,22 +91,6 @@ def test_topology_of_balls(centres, radius, found):
 
 
 # ---------------------------------------------------------------------------------------------------------------- paths
-
-
-def test_edges_are_cut_evenly_and_nothing_else_changes():
-    nodes = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [1, 1, 0.04]])
-    edges, radii = np.array([[0, 1], [2, 1], [2, 3]]), np.array([0.1, 0.2, 0.3, 0.1])
-    places, links, thick = subdivided(nodes, edges, radii)
-    np.testing.assert_array_equal(places[:4], nodes)
-    np.testing.assert_array_equal(thick[:4], radii)
-    assert len(places) == 4 + 19 + 9 + 0
-    length = np.linalg.norm(places[links[:, 1]] - places[links[:, 0]], axis=1)
-    np.testing.assert_allclose(length[:20], 0.05)
-    np.testing.assert_allclose(length[20:30], 0.1)
-    np.testing.assert_allclose(thick[4:23], 0.1 + 0.1 * places[4:23, 0])
-    graph = nx.Graph(links.tolist())
-    assert nx.shortest_path(graph, 0, 3) == [0, *range(4, 23), 1, *range(31, 22, -1), 2, 3]
-    assert graph.number_of_edges() == len(links) == len(places) - 1
 
 
 def test_the_shortest_loop_through_a_chain():

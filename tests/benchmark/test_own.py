@@ -5,16 +5,15 @@ import sys
 
 import numpy as np
 import pytest
-from glsk_bench import add_shape, leaderboard, make, read_folder, run, score_answers
+from glsk_bench import add_shape, make, read_folder, run, score_answers
 from glsk_bench.folders import INDEX_NAME
 from glsk_bench.radii import radii_from_points
 
-from glsk_o3d import Skeleton, read_cloud, samples, save_skeleton
-from glsk_o3d.errors import FileFormatError, InvalidParameterError
+from glsk_o3d import read_cloud, samples
+from glsk_o3d.errors import InvalidParameterError
 
 FORK = samples.y_junction(900)
 AXIS = (FORK.nodes, FORK.edges, FORK.radii)
-COPY = "import shutil, sys; shutil.copy(sys.argv[3], sys.argv[2])"
 
 
 @pytest.fixture
@@ -57,12 +56,6 @@ class TestFolder:
         assert b"property double x" in path.read_bytes()[:200]
         np.testing.assert_array_equal(np.asarray(read_cloud(path).points), FORK.points + place)
 
-    def test_more_variants_of_a_shape(self, own):
-        made = add_shape(own.path, "a.fork", {"thin": FORK.points[::3]}, *AXIS[:2], family="forks")
-        assert [cloud.variant for cloud in made.clouds] == ["late", "early", "thin", "scan"]
-        np.testing.assert_array_equal(made.truth("a.fork").radii, FORK.radii)  # those that it had
-        assert made.name != own.name
-
 
 class TestRefusals:
     @pytest.mark.parametrize("name", ["", ".hidden", "../a", "a b", "a\n", 3])
@@ -73,18 +66,9 @@ class TestRefusals:
         assert not (tmp_path / "own").exists()
 
     @pytest.mark.parametrize(
-        ("shape", "variant", "said"),
-        [
-            ("a.fork_late", "x", None),
-            ("a.fork", "late_x", None),
-            ("A.fork", "x", "one file"),
-            ("a.fork", "Late", "name of two clouds"),
-        ],
+        ("shape", "variant", "said"), [("A.fork", "x", "one file"), ("a.fork", "Late", "name of two clouds")]
     )
     def test_names_of_other_clouds(self, own, shape, variant, said):
-        if said is None:
-            add_shape(own.path, shape, {variant: FORK.points}, *AXIS)
-            return
         with pytest.raises(InvalidParameterError, match=said):
             add_shape(own.path, shape, {variant: FORK.points}, *AXIS)
 
@@ -108,36 +92,18 @@ class TestRefusals:
         [
             ({}, AXIS, "no cloud is given"),
             ({"a": FORK.points * np.nan}, AXIS, "not finite"),
-            ({"a": FORK.points * 1e300}, AXIS, "not finite, or beyond"),
             ({"a": FORK.points}, (AXIS[0], [[0, 99]]), "fork: .*missing vertex"),
             ({"a": FORK.points}, ("nodes", []), "fork: the axis has invalid nodes"),
-            ({"a": FORK.points}, (np.empty((0, 3)), []), "fork: .*empty"),
             ({"a": FORK.points}, (*AXIS[:2], 0 * AXIS[2]), "fork: .*positive"),
             ({"a": FORK.points}, (AXIS[0] + 99, AXIS[1]), "fork: the axis has no points near"),
             ({"a": FORK.points[:2]}, AXIS[:2], "fork: no node of the axis has 3 points"),
-            (
-                {"a": np.linspace([0, 0, 0], [1, 0, 0], 50)},
-                ([[0, 0, 0], [1, 0, 0]], [[0, 1]]),
-                "radii cannot be measured",
-            ),
+            ({"a": 1000 * FORK.points}, AXIS, r"fork_a: the cloud is .* the same units"),
         ],
     )
     def test_clouds_and_axes_of_no_use(self, tmp_path, clouds, axis, said):
         with pytest.raises(InvalidParameterError, match=said):
             add_shape(tmp_path, "fork", clouds, *axis)
         assert not (tmp_path / INDEX_NAME).exists()
-
-    def test_a_damaged_index(self, own):
-        (own.path / INDEX_NAME).write_text('{"version": "own", "complete": true, "shapes": {"a": {"clouds": 3}}}')
-        with pytest.raises(FileFormatError, match="damaged"):
-            add_shape(own.path, "b", {"a": FORK.points}, *AXIS)
-
-
-@pytest.mark.parametrize("factor", [1000.0])
-def test_an_axis_in_other_units_is_refused(tmp_path, factor):
-    with pytest.raises(InvalidParameterError, match=r"fork_scan: the cloud is .* the same units"):
-        add_shape(tmp_path, "fork", {"scan": factor * FORK.points}, *AXIS)
-    assert not list(tmp_path.iterdir())
 
 
 class TestAnswers:
@@ -188,31 +154,3 @@ class TestRadii:
     def test_a_ball(self):
         ball = samples.sphere(500).points
         np.testing.assert_allclose(radii_from_points(np.zeros((1, 3)), np.empty((0, 2), int), ball), [0.5], rtol=0.01)
-
-
-class TestScores:
-    def test_from_a_command_to_the_table(self, own, tmp_path):
-        for cloud in own.clouds:
-            truth = own.truth(cloud.shape)
-            save_skeleton(Skeleton(truth.nodes, truth.edges, truth.radii, (), (), ()), tmp_path / f"{cloud.shape}.obj")
-        words = [sys.executable, "-S", "-c", COPY, "{cloud}", "{skeleton}", str(tmp_path / "a.fork.obj")]
-        assert run(own.path, tmp_path / "mine", command=words, ending=".obj").failures == {}
-        results = score_answers(own.path, tmp_path / "mine")
-        perfect = {f"{row['shape']}_{row['variant']}": row["perfect"] for row in results.rows}
-        assert perfect == {"a.fork_late": True, "a.fork_early": True, "zig_scan": False}  # the last is larger
-        assert (results.benchmark, results.whole) == (own.name, False)
-        board = leaderboard([results])
-        assert list(board.entries[0]["variants"]) == ["late", "early", "scan"]
-        text = board.markdown()
-        assert text.startswith(f"Benchmark {own.name}. Means")
-        assert "3 clouds of 2 shapes" in text
-
-    def test_scores_of_other_clouds_are_not_compared(self, own, tmp_path):
-        other = add_shape(tmp_path / "b", "zig", {"scan": FORK.points}, *AXIS)
-        add_shape(tmp_path / "c", "zig", {"scan": FORK.points[::2]}, *AXIS)
-        (tmp_path / "mine").mkdir()
-        save_skeleton(Skeleton(*AXIS, (), (), ()), tmp_path / "mine" / "zig_scan.obj")
-        results = [score_answers(tmp_path / each, tmp_path / "mine", name=each) for each in "bc"]
-        assert other.name == results[0].benchmark
-        with pytest.raises(InvalidParameterError, match="different clouds"):
-            leaderboard(results)

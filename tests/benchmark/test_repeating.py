@@ -1,6 +1,5 @@
 """Several clouds of one object: how they are drawn, and how far answers to them are apart."""
 
-import importlib.util
 import json
 
 import numpy as np
@@ -9,7 +8,7 @@ import pytest
 from glsk_bench import repeat, run, sample, score_answers, spread
 from glsk_bench.repeating import PLACES
 
-from glsk_o3d import Skeleton, read_cloud, samples, save_skeleton
+from glsk_o3d import Skeleton, read_cloud
 from glsk_o3d.errors import FileFormatError, InvalidParameterError
 
 
@@ -43,10 +42,6 @@ class TestSpread:
         assert found["where"]["ends"] == pytest.approx(by / radius * 4 * radius / 20, rel=0.05)  # of a length of twenty
         assert found["where"]["limbs"] == found["where"]["junctions"] == 0
 
-    def test_of_three_all_pairs_count(self):
-        found = spread([BAR, moved(BAR, [0, 0, 0.3]), moved(BAR, [0, 0, -0.3])], 1.0)
-        assert found["moved"] == pytest.approx((0.3 + 0.3 + 0.6) / 3)
-
     def test_a_limb_that_another_lacks(self):
         trunk = line((-20, 0, 0), (0, 0, 0), (20, 0, 0))
         found = spread([FORK, trunk], 1.0, loops=0, ends=[3, 4])
@@ -57,12 +52,6 @@ class TestSpread:
         assert found["where"]["junctions"] == pytest.approx(2**2 / 2 / 60 / 2, rel=0.2)
         assert sum(found["where"].values()) == pytest.approx(found["moved"])
 
-    def test_hooks_are_counted(self):
-        hook = line((0, 0, 0), (19, 0, 0), (19, 1, 0))
-        found = spread([hook, BAR], 1.0)
-        assert (found["hooks"], found["tips"]) == (1, 4)
-        assert spread([hook, BAR], 6.0)["tips"] == 0
-
     @pytest.mark.parametrize("nothing", [None, Skeleton(np.empty((0, 3)), [], [], (), (), ())])
     def test_a_failure_agrees_with_nothing(self, nothing):
         found = spread([BAR, nothing, BAR], 1.0, loops=0, ends=[2, 2])
@@ -71,40 +60,6 @@ class TestSpread:
         for few, agree in (([BAR, nothing], 0.5), ([nothing, nothing], 0)):
             found = spread(few, 1.0)
             assert (found["moved"], found["where"], found["agree"]) == (None, None, agree)
-
-    def test_a_skeleton_of_one_vertex(self):
-        dot = Skeleton([[0, 0, 3]], [], [1], (), (), ())
-        found = spread([dot, dot], 1.0)
-        assert (found["moved"], found["found"]) == (0, [[1, 0, 0]] * 2)
-
-    @pytest.mark.parametrize(("skeletons", "radius"), [([], 1), ([BAR], 0), ([BAR], np.nan), ([BAR], np.inf)])
-    def test_what_cannot_be_compared(self, skeletons, radius):
-        with pytest.raises(InvalidParameterError, match="a positive radius"):
-            spread(skeletons, radius)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_agrees_with_the_yardstick(shared_dir, seed):
-    spec = importlib.util.spec_from_file_location("repeated", shared_dir / "repeat.py")
-    spec.loader.exec_module(yardstick := importlib.util.module_from_spec(spec))
-    rng, axis = (
-        np.random.default_rng(seed),
-        [samples.y_junction, samples.sauropod, samples.torus, samples.tree][seed](200),
-    )
-    known = dict(loops=int(seed == 2), ends=[3, 5])
-    for noise in (0.1, 0.5):
-        skeletons = []
-        for _ in range(4):
-            vertices = axis.nodes + noise * axis.radii[:, None] * rng.normal(size=axis.nodes.shape)
-            edges = np.asarray(axis.edges)[rng.random(len(axis.edges)) < 0.98]
-            skeletons.append(Skeleton(vertices, edges, axis.radii, (), (), ()))
-        radius = float(np.median(axis.radii))
-        expected = yardstick.compare([(each.vertices, each.edges) for each in skeletons], known, radius)
-        found = spread(skeletons, radius, **known)
-        assert found["found"] == [list(each) for each in expected["found"]]
-        assert found["where"] == pytest.approx(expected["where"], abs=1e-9)
-        for name in ("moved", "agree", "hooks", "tips", "loops", "ends"):
-            assert found[name] == pytest.approx(expected[name], abs=1e-9)
 
 
 @pytest.fixture
@@ -147,11 +102,6 @@ class TestSamples:
             with pytest.raises(InvalidParameterError, match="has other clouds of box"):
                 sample(tmp_path / "made", meshes, **(dict(draws=2, n=300) | other))
 
-    def test_noise(self, meshes, tmp_path):
-        plain, noisy = (sample(tmp_path / str(noise), meshes, draws=2, n=500, noise=noise) for noise in (0.0, 0.01))
-        one, other = (np.asarray(read_cloud(made.clouds[0].path).points) for made in (plain, noisy))
-        assert (other - one).std() == pytest.approx(0.01 * np.sqrt(38), rel=0.1)  # the box's diagonal
-
     def test_shapes_of_the_benchmark(self, rods, tmp_path):
         made = sample(tmp_path / "made", version="v1", draws=2, n=200)
         assert rods == ["figures_100", "frames_100", "groups_100", "handles_100", "trees_100", "tubes_100"]
@@ -161,36 +111,22 @@ class TestSamples:
         np.testing.assert_array_equal(made.truth("trees_100").radii, np.full(3, 0.05))
 
     @pytest.mark.parametrize(
-        ("options", "said"),
-        [
-            (dict(draws=1), "draws = 1: must be at least 2"),
-            (dict(n=0), "n = 0: must be at least 1"),
-            (dict(noise=-0.1), "noise = -0.1"),
-            (dict(meshes=None, version="v0"), "no version"),
-        ],
+        ("options", "said"), [(dict(draws=1), "draws = 1: must be at least 2"), (dict(noise=-0.1), "noise = -0.1")]
     )
     def test_wrong_options(self, meshes, tmp_path, options, said):
         with pytest.raises(InvalidParameterError, match=said):
-            sample(tmp_path / "made", **(dict(meshes=meshes) | options))
+            sample(tmp_path / "made", meshes, **options)
 
     def test_wrong_meshes(self, meshes, tmp_path):
         with pytest.raises(FileNotFoundError, match="has no meshes"):
             sample(tmp_path / "made", tmp_path / "none")
-        for text in (
-            "",
-            "{}",
-            '{"meshes": [{"name": "box", "ends": 2}]}',
-            '{"meshes": [{"name": "box", "loops": -1}]}',
-        ):
+        for text in ("", '{"meshes": [{"name": "box", "loops": -1}]}'):
             (meshes / "manifest.json").write_text(text)
             with pytest.raises(FileFormatError, match=r"manifest\.json: is damaged"):
                 sample(tmp_path / "made", meshes)
         (meshes / "manifest.json").unlink()
         (meshes / "box.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n")
         with pytest.raises(InvalidParameterError, match="'box' is no plain name, or that of two meshes"):
-            sample(tmp_path / "made", meshes)
-        (meshes / "box.off").rename(meshes / "a.off")
-        with pytest.raises(FileFormatError, match=r"a\.off: its triangles have no area"):
             sample(tmp_path / "made", meshes)
 
 
@@ -232,16 +168,3 @@ class TestRepeat:
         small.save()
         with pytest.raises(InvalidParameterError, match="has one cloud of trees_101"):
             repeat(small.path, perfect)
-
-    def test_ends_that_are_a_matter_of_taste(self, small, perfect):
-        del small.shapes["trees_101"]
-        axis = small.truth("tubes_100")
-        for cloud in ("clean", "scan2"):
-            save_skeleton(line((-0.4, 0, 0), (0.1, 0, 0)), perfect / f"tubes_100_{cloud}.obj")
-        found = {row["object"]: row["ends"] for row in repeat(small, perfect).rows}
-        assert found == {"trees_100": 1, "tubes_100": 1, "tubes_101": 1}
-        parts = dict(
-            half_width=axis.radii, flat=np.empty(0, int), judged=np.array([True, False]), mirror=np.empty((0, 3))
-        )
-        np.savez(small.path / "truth/tubes_100.npz", nodes=axis.nodes, edges=axis.edges, radii=axis.radii, **parts)
-        assert {row["object"]: row["ends"] for row in repeat(small, perfect).rows} == found | {"tubes_100": None}

@@ -7,14 +7,12 @@ import numpy as np
 import pytest
 from glsk_bench.shapes import FAMILIES, shape
 from glsk_bench.shapes.axis import Axis, UnfitDraw, subdivided
-from glsk_bench.shapes.curves import generator, wander
+from glsk_bench.shapes.curves import generator
 from glsk_bench.shapes.drawing import DRAWN_BY, SURFACE_POINTS
-from glsk_bench.shapes.trees import Habit, _grow
 from scipy.spatial.distance import cdist
 
 from glsk_o3d.errors import InvalidParameterError
 
-ARRAYS = ("nodes", "edges", "radii", "points", "normals")
 EACH = [(family, seed) for family in FAMILIES["v1"] for seed in (0, 1)]
 FINGERPRINTS = {
     "tubes": "513563cf574befa2",
@@ -103,15 +101,6 @@ def test_parts_of_groups_keep_their_distance_and_come_near():
     assert 1.9 < max(gaps) < 2.05 + 1e-9
 
 
-def test_a_tree_without_room_is_another_draw():
-    axis, rng = Axis(), generator("crowd", 0)
-    root = axis.ball([0, 0, 0], 0.05)
-    for place in rng.normal(size=(4000, 3)):
-        axis.ball(0.5 * place / np.linalg.norm(place), 0.05)
-    with pytest.raises(UnfitDraw, match="no room"):
-        _grow(axis, rng, Habit(3, 1, 0.02, 2, 0.3, (32, 62)), root, np.array([0, 0, 1.0]), 3)
-
-
 def test_refused_draws_are_counted(monkeypatch):
     def picky(rng):
         kind = rng.random()
@@ -144,33 +133,3 @@ def test_what_makes_no_shape_is_refused(family, seed, message):
 
 
 # ------------------------------------------------------------------------------------------------------ parts of shapes
-
-
-@pytest.mark.parametrize("bend", [0, 0.5, 5])
-def test_curves_wander_at_an_even_pace_and_about_as_far_as_asked(bend):
-    turned = []
-    for seed in range(10):
-        places = wander(generator("curve", seed), np.array([1, 2, 3.0]), np.array([0, 3, 0]), 2.0, 40, bend)
-        steps = np.diff(places, axis=0)
-        np.testing.assert_allclose(np.linalg.norm(steps, axis=1), 0.05)
-        np.testing.assert_array_equal(places[0], [1, 2, 3])
-        np.testing.assert_allclose(steps[0], [0, 0.05, 0], atol=1e-12)
-        cosine = (steps[1:] * steps[:-1]).sum(axis=1) / 0.05**2
-        turned.append(np.arccos(np.clip(cosine, -1, 1)).sum())
-    assert np.median(turned) == pytest.approx(bend, rel=0.15, abs=1e-5)
-
-
-def test_parts_keep_their_thickness_where_they_start_in_something_thicker():
-    axis = Axis()
-    a, b = axis.ball([0, 0, 0], 0.3), axis.ball([1, 0, 0], 0.1)
-    axis.bar(a, b, 0.1)
-    assert axis.sizes[2:] == [0.1, 0.1]
-    np.testing.assert_allclose(axis.nodes[2:, 0], [0.02, 0.98])
-    assert axis.links == [(0, 2), (2, 3), (3, 1)]
-    end = axis.limb(generator("limb", 0), a, np.array([0, 0, 1]), 1, 0.1, 0.05, bend=0)
-    assert np.linalg.norm(axis.places[4]) < 0.01
-    assert (axis.sizes[4], axis.sizes[end]) == (pytest.approx(0.1, rel=0.15), 0.05)
-    thin = Axis()
-    thin.bar(thin.ball([0, 0, 0], 0.1), thin.ball([1, 0, 0], 0.1), 0.1, bow=np.array([0, 0.2, 0]))
-    assert thin.nodes[:, 1].max() == pytest.approx(0.2, rel=0.05)
-    assert len(thin.links) == len(thin.places) - 1 == 6

@@ -1,48 +1,19 @@
-"""The table: its numbers, its words, and what cannot be compared."""
+"""The table: its numbers, its words, its intervals, and what cannot be compared."""
 
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from glsk_bench import Results, Scores, leaderboard
+from glsk_bench.table import mean_with_interval, told
+from scipy import stats
 
 from glsk_o3d.errors import InvalidParameterError
 
 BEST = Scores(True, True, 1.0, 1.0, 0.1, 1.0, 1.0, 1.0, None, 0, 0, 0, 0)
 WRONG = Scores(False, False, 0.5, 0.0, 0.3, 0.8, 0.9, 1.2, 0.4, 1, 0, 0, 0)
 FAILED = Scores.of_failure("no answer")
-
-GOLDEN = """\
-Benchmark v1, not all of it, or other shapes. Means, and in brackets 95 % intervals from drawing the shapes anew. A \
-failure is neither perfect nor right in its topology, and its F1 are 0; what comes after these are means over the \
-answers that could be scored. Seconds are medians.
-
-**4 clouds of 2 shapes**
-
-| program | clouds | failures | perfect | topology | tips F1 | junctions F1 | error | inside | completeness | s |
-| --- | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: |
-| good | 4 | 0 | 0.75 [0.50, 1.00] | 0.75 [0.50, 1.00] | 0.88 [0.75, 1.00] | 0.75 [0.50, 1.00] | \
-0.150 [0.100, 0.200] | 0.95 [0.90, 1.00] | 0.97 [0.95, 1.00] | 2.50 |
-| a \\| bad | 4 | 3 | 0.25 [0.00, 0.50] | 0.25 [0.00, 0.50] | 0.25 [0.00, 0.50] | 0.25 [0.00, 0.50] | \
-0.100 [0.100, 0.100] | 1.00 [1.00, 1.00] | 1.00 [1.00, 1.00] | - |
-
-**good**
-
-| variant | clouds | failures | perfect | topology | tips F1 | junctions F1 | error | inside | completeness | s |
-| --- | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: |
-| clean | 2 | 0 | 1.00 [1.00, 1.00] | 1.00 [1.00, 1.00] | 1.00 [1.00, 1.00] | 1.00 [1.00, 1.00] | \
-0.100 [0.100, 0.100] | 1.00 [1.00, 1.00] | 1.00 [1.00, 1.00] | 2.00 |
-| scan2 | 2 | 0 | 0.50 [0.00, 1.00] | 0.50 [0.00, 1.00] | 0.75 [0.50, 1.00] | 0.50 [0.00, 1.00] | \
-0.200 [0.100, 0.300] | 0.90 [0.80, 1.00] | 0.95 [0.90, 1.00] | 3.00 |
-
-**a \\| bad**
-
-| variant | clouds | failures | perfect | topology | tips F1 | junctions F1 | error | inside | completeness | s |
-| --- | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: |
-| clean | 2 | 1 | 0.50 [0.00, 1.00] | 0.50 [0.00, 1.00] | 0.50 [0.00, 1.00] | 0.50 [0.00, 1.00] | \
-0.100 [0.100, 0.100] | 1.00 [1.00, 1.00] | 1.00 [1.00, 1.00] | - |
-| scan2 | 2 | 2 | 0.00 [0.00, 0.00] | 0.00 [0.00, 0.00] | 0.00 [0.00, 0.00] | 0.00 [0.00, 0.00] | - | - | - | - |
-"""
 
 
 def results(name, *scores, seconds=(None,) * 4, whole=False):
@@ -62,9 +33,20 @@ def two():
 
 def test_in_markdown(two, tmp_path):
     board = leaderboard(two)
-    assert board.markdown() == GOLDEN
     board.save(tmp_path / "table.md")
-    assert (tmp_path / "table.md").read_text() == GOLDEN
+    text = (tmp_path / "table.md").read_text()
+    assert text == board.markdown()
+    intro, title, first, name, of_good, other, of_bad = text.split("\n\n")
+    assert intro.startswith("Benchmark v1, not all of it, or other shapes. Means")
+    assert (title, name, other) == ("**4 clouds of 2 shapes**", "**good**", "**a \\| bad**")
+    heads, _, *lines = ([cell.strip() for cell in line.split(" | ")] for line in first.splitlines())
+    cells = {line[0]: dict(zip(heads, line, strict=True)) for line in lines}
+    good, bad = cells["| good"], cells["| a \\| bad"]
+    assert (good["failures"], good["perfect"], good["error"]) == ("0", "0.75 [0.50, 1.00]", "0.150 [0.100, 0.200]")
+    assert (bad["failures"], bad["perfect"], bad["error"]) == ("3", "0.25 [0.00, 0.50]", "0.100 [0.100, 0.100]")
+    assert (good["s |"], bad["s |"]) == ("2.50 |", "- |")
+    assert [line.split(" | ")[1] for line in of_good.splitlines()[2:]] == ["2", "2"]  # clouds of a variant
+    assert of_bad.splitlines()[3].endswith("| - | - | - | - |")  # none of which could be scored
 
 
 def test_what_only_things_have_has_columns_where_it_is_known(two):
@@ -106,3 +88,33 @@ def test_what_cannot_be_compared(two):
     for none in ([], [Results("v1", "a", False, [])]):
         with pytest.raises(InvalidParameterError, match="no scores"):
             leaderboard(none)
+
+
+@pytest.mark.parametrize(("right", "of"), [(3, 20), (18, 20), (250, 300)])
+def test_of_a_share_is_binomial(right, of):
+    mean, *ends = mean_with_interval([*map(str, range(of))], [True] * right + [False] * (of - right))
+    assert mean == right / of
+    np.testing.assert_allclose(ends, stats.binom.ppf([0.025, 0.975], of, mean) / of, atol=1.001 / of)
+
+
+def test_is_that_of_scipy():
+    values = np.random.default_rng(3).gamma(1.5, size=40)
+    found = mean_with_interval([*map(str, range(40))], values)
+    options = dict(method="percentile", n_resamples=20_000, rng=np.random.default_rng(4))
+    expected = stats.bootstrap((values,), np.mean, **options).confidence_interval
+    np.testing.assert_allclose(found, [values.mean(), *expected], atol=0.04)
+
+
+def test_more_clouds_of_a_shape_are_no_more_evidence():
+    shapes, values = [*map(str, range(30))], np.random.default_rng(5).random(30)
+    once = mean_with_interval(shapes, values)
+    assert mean_with_interval(shapes * 4, [*values] * 4) == pytest.approx(once, rel=1e-12)
+    apart = mean_with_interval([*map(str, range(120))], [*values] * 4)
+    assert apart[2] - apart[1] == pytest.approx((once[2] - once[1]) / 2, rel=0.15)
+
+
+def test_in_words():
+    assert told(0.984, 0.9, 1) == "0.98 [0.90, 1.00]"
+    assert told(-0.001, -0.0123, 0.0006, 3, "+") == "-0.001 [-0.012, +0.001]"
+    assert told(-0.001, -0.001, 0.0, sign="+") == "+0.00 [+0.00, +0.00]"
+    assert told(*mean_with_interval([], [])) == "-"

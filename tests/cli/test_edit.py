@@ -61,7 +61,7 @@ def line(tmp_path):
     ("word", "x"), [("x", -1), ("-x", 2), ("thickest", 2), ("1", 0), ("0.9,0.1,0", 1), ("-0.9,0.1,0", -1)]
 )
 def test_a_root_in_all_words(invoke, line, tmp_path, word, x):
-    names = [f"t.{name}" for name in ("swc", "mtg", "plant.csv", "urdf", "glb")]
+    names = [f"t.{name}" for name in ("swc", "urdf", "glb")]
     assert invoke("convert", line, *names, "--root", word).stderr == ""
     for name in names:
         save_skeleton(read_skeleton(line), tmp_path / f"expected-{name}", root=[x, 0, 0])

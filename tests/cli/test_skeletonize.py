@@ -159,8 +159,6 @@ def test_a_scan_with_labels_has_all_that_it_had(invoke, las, tmp_path):
 
 def test_tubes_are_those_of_the_skeleton(invoke, las, tmp_path):
     words = ("skeletonize", las, "--where", "z > 122", "-o", "s.npz")
-    result = invoke(*words, "--tubes", "t.stl")
-    assert result.stderr.startswith("glsk: error: t.stl: .stl has too few digits for coordinates as large as 5.61e+06")
     assert invoke(*words, "--tubes", "t.ply").exit_code == 0
     tubes, skeleton = read_mesh(tmp_path / "t.ply"), read_skeleton(tmp_path / "s.npz")
     np.testing.assert_array_equal(np.asarray(tubes.vertices), np.asarray(to_tubes(skeleton).vertices))

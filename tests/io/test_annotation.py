@@ -5,7 +5,7 @@ import open3d as o3d
 import pytest
 
 import glsk_o3d as glsk
-from glsk_o3d import InvalidParameterError, annotate, annotate_contraction, samples
+from glsk_o3d import InvalidParameterError, annotate, samples
 from glsk_o3d.analysis import branch_table, segment
 from glsk_o3d.io.colors import thickness_shades
 
@@ -29,11 +29,6 @@ def skeleton(cloud):
     return glsk.skeletonize(cloud)
 
 
-@pytest.fixture(scope="module")
-def state(cloud):
-    return (glsk.RingBuilder() | glsk.Contractor(reducer=glsk.LPRReducer()))(cloud)
-
-
 def held(cloud):
     return {name: cloud.point[name].numpy() for name in cloud.point}
 
@@ -45,7 +40,7 @@ def assert_equal(found, expected):
         np.testing.assert_array_equal(found[name], values, err_msg=name)
 
 
-def test_tensor_clouds_keep_what_they_have_and_gain_ours(cloud, skeleton, state):
+def test_tensor_clouds_keep_what_they_have_and_gain_ours(cloud, skeleton):
     before, vertex, branch = held(cloud), skeleton.vertex_of_point, segment(skeleton)
     annotated = held(annotate(skeleton, cloud))
     kind = cloud.point.positions.numpy().dtype
@@ -58,31 +53,8 @@ def test_tensor_clouds_keep_what_they_have_and_gain_ours(cloud, skeleton, state)
     }
     assert annotated.pop("thickness").dtype == kind
     assert_equal(annotated, before | {name: values[:, None] for name, values in gained.items()})
-    contracted = held(annotate_contraction(state, cloud))
-    expected = state.contracted[state.survivor_of_point].astype(kind)
-    assert_equal(contracted, before | {"contracted": expected})
     assert_equal(held(cloud), before)
     assert not np.shares_memory(annotated["positions"], before["positions"])
-
-
-def test_through_selections_sampling_and_files(cloud, skeleton, state, tmp_path):
-    annotated = annotate(skeleton, cloud)
-    everything = held(annotated)
-    mask = everything["branch"][:, 0] == 1
-    assert_equal(held(annotated.select_by_mask(o3d.core.Tensor(mask))), {n: v[mask] for n, v in everything.items()})
-    thin = annotated.voxel_down_sample(0.08)
-    assert held(thin).keys() == everything.keys()
-    again = annotate(skeleton, thin)  # labels are labels again, not means of labels
-    np.testing.assert_array_equal(again.point.branch.numpy()[:, 0], segment(skeleton, thin))
-    for ending in ("ply", "pcd", "npz"):
-        path = str(tmp_path / f"cloud.{ending}")
-        assert o3d.t.io.write_point_cloud(path, annotated)
-        assert_equal(held(o3d.t.io.read_point_cloud(path)), everything)
-    path, annotated = str(tmp_path / "cloud.ply"), annotate_contraction(state, cloud)
-    assert o3d.t.io.write_point_cloud(path, annotated)
-    back = o3d.t.io.read_point_cloud(path)
-    columns = np.hstack([back.point[f"contracted_{i}"].numpy() for i in range(3)])
-    np.testing.assert_array_equal(columns, annotated.point.contracted.numpy())
 
 
 def test_legacy_clouds_arrays_and_meshes_become_tensor_ones(skeleton):
@@ -113,10 +85,6 @@ def test_whole_numbers_and_points_that_are_not_finite():
     assert (annotated.point.positions.dtype, annotated.point.radius.dtype) == (o3d.core.int32, o3d.core.float64)
     points[7] = np.nan
     state = (glsk.Sampler(drop_invalid=True) | glsk.RingBuilder() | glsk.Contractor())(points)
-    places = annotate_contraction(state).point.contracted.numpy()
-    np.testing.assert_array_equal(np.flatnonzero(np.isnan(places).any(axis=1)), [7])
-    moved = annotate_contraction(state, np.r_[points[:3] + 0.1, [[np.inf] * 3]]).point.contracted.numpy()
-    np.testing.assert_array_equal(moved, np.r_[places[:3], [[np.nan] * 3]])
     annotated = annotate((glsk.Connector() | glsk.Refiner())(state), points, color="radius")
     assert annotated.point.branch.numpy()[7] == annotated.point.skeleton_vertex.numpy()[7] == -1
     assert np.isnan(annotated.point.radius.numpy()[7])
@@ -133,7 +101,5 @@ def test_colours(cloud, skeleton):
     marked = annotate(skeleton, cloud, color="thickness").point
     expected = np.round(255 * thickness_shades(marked.thickness.numpy()[:, 0].astype(float)))
     assert np.abs(marked.colors.numpy() - expected).max() <= 1
-    legacy = annotate(skeleton, cloud, color="branch").to_legacy()
-    np.testing.assert_allclose(np.asarray(legacy.colors), shown / 255, atol=1e-6)
     with pytest.raises(InvalidParameterError, match="color"):
         annotate(skeleton, cloud, color="size")

@@ -13,11 +13,9 @@ from glsk_o3d.io.paths import CLOUD_ENDINGS, MESH_ENDINGS
 from glsk_o3d.io.scans import promised_points, read_blocks, read_cloud, read_scan, read_tensor_cloud, save_tensor_cloud
 from glsk_o3d.io.skeletons import READABLE, read_skeleton, read_truth
 
-OPTIONS = pytest.mark.parametrize("options", [{}, {"write_ascii": True}, {"compressed": True}], ids=str)
-
 
 @pytest.mark.parametrize("name", ["c.ply", "c.pcd", "c.xyz", "c.xyzn", "c.xyzrgb", "c.pts", "c é.Pcd"])
-@OPTIONS
+@pytest.mark.parametrize("options", [{}, {"write_ascii": True}, {"compressed": True}], ids=str)
 def test_clouds_that_open3d_writes(cloud, xyz, tmp_path, name, options):
     kind = name.lower().split(".")[1]
     assert o3d.io.write_point_cloud(str(tmp_path / f"plain.{kind}"), cloud, **options)
@@ -28,7 +26,7 @@ def test_clouds_that_open3d_writes(cloud, xyz, tmp_path, name, options):
     assert back.has_colors() == (kind in ("ply", "pcd", "xyzrgb", "pts"))
 
 
-@pytest.mark.parametrize("name", ["c.ply", "c.pcd", "c.npz", "C.PLY"])
+@pytest.mark.parametrize("name", ["c.ply", "C.PLY"])
 @pytest.mark.parametrize("normals", [np.float64, np.float32])
 def test_tensor_clouds_come_back_as_they_were(tmp_path, capfd, name, normals):
     rng = np.random.default_rng(0)
@@ -46,27 +44,28 @@ def test_tensor_clouds_come_back_as_they_were(tmp_path, capfd, name, normals):
     save_tensor_cloud(cloud, tmp_path / name)
     assert capfd.readouterr() == ("", "")
     path = str(tmp_path / name)
-    back = o3d.t.io.read_point_cloud(path) if name.endswith("npz") else read_tensor_cloud(path)
-    assert {*back.point} == held.keys()
-    for key, values in held.items():
-        assert key == "normals" or back.point[key].numpy().dtype == values.dtype
-        np.testing.assert_array_equal(back.point[key].numpy(), values, err_msg=key)
+    for back in (o3d.t.io.read_point_cloud(path), read_tensor_cloud(path)):
+        assert {*back.point} == held.keys()
+        for key, values in held.items():
+            assert key == "normals" or back.point[key].numpy().dtype == values.dtype
+            np.testing.assert_array_equal(back.point[key].numpy(), values, err_msg=key)
 
 
-def test_a_cloud_that_breaks_off_is_no_file(tmp_path, monkeypatch):
-    write = o3d.t.io.write_point_cloud
-
-    def full(path, cloud):
-        done = write(path, cloud)
-        os.truncate(path, 400)
-        return done
-
-    monkeypatch.setattr(o3d.t.io, "write_point_cloud", full)
-    with pytest.raises(OSError, match="could not write all of it"):
-        save_tensor_cloud(o3d.t.geometry.PointCloud(np.eye(3).repeat(20, axis=0)), tmp_path / "c.ply")
-    with pytest.raises(FileFormatError, match=r"c\.xyz.*\.npz"):
-        save_tensor_cloud(o3d.t.geometry.PointCloud(np.eye(3)), tmp_path / "c.xyz")
-    assert not list(tmp_path.iterdir())
+def test_attributes_that_ply_does_not_hold(tmp_path):
+    cloud = o3d.t.geometry.PointCloud(np.eye(3))
+    for name, values in (("place", np.eye(3)), ("id", np.array([[1], [2], [2**40]])), ("seen", np.eye(3)[:, :1] > 0)):
+        cloud.point[name] = o3d.core.Tensor(values)
+    cloud.point.colors = o3d.core.Tensor(np.eye(3))
+    save_tensor_cloud(cloud, tmp_path / "c.ply")
+    back = read_tensor_cloud(tmp_path / "c.ply").point
+    assert {name: back[name].numpy().ravel().tolist() for name in ("place_1", "id", "seen")} == {
+        "place_1": [0, 1, 0],
+        "id": [1, 2, 2**40],
+        "seen": [1, 0, 0],
+    }
+    np.testing.assert_array_equal(back.colors.numpy(), 255 * np.eye(3))
+    with pytest.raises(FileFormatError, match=r"c\.xyz: the cloud with labels is PLY"):
+        save_tensor_cloud(cloud, tmp_path / "c.xyz")
 
 
 # -------------------------------------------------------------------------------------------------------- what is none
@@ -74,7 +73,7 @@ def test_a_cloud_that_breaks_off_is_no_file(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("name", [f"s{ending}" for ending in READABLE] + ["c.md", "c.bin"])
 def test_what_is_no_scan(skeleton, tmp_path, name):
-    says = r"is a skeleton" if name in ("s.ply", "s.obj", "s.polylines.txt") else r"unknown ending; .*\.ply.*\.pcd"
+    says = r"is a skeleton" if name in ("s.ply", "s.obj") else r"unknown ending; .*\.ply.*\.pcd"
     save_skeleton(skeleton, tmp_path / name, cut_loops=True, format=None if name[0] == "s" else "ply")
     with pytest.raises(FileFormatError, match=rf"{name}: {says}"):
         read_cloud(tmp_path / name)
@@ -117,12 +116,10 @@ PLY = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float
     ("name", "text", "says"),
     [
         ("c.ply", PLY + "end_header\n1 2 3\n4 five 6\n", "five"),
-        ("c.ply", PLY.replace("x 2", "x 99999999999") + "end_header\n1 2 3\n", "promises 99999999999 points and"),
         ("c.ply", PLY.replace("vertex 2", "vertex 0") + "end_header\n", "no points"),
         ("c.ply", PLY.replace("vertex 2", "face 2") + "end_header\n1 2 3\n4 5 6\n", "vertex"),
         ("c.pts", "1 2 3\n4 5 6\n", "number of points"),
         ("c.pts", "2\n1 2 3\n4 x 6\n", "promises 2 points and holds 1"),
-        ("c.pts", "99999999999999\n1 2 3\n", "holds 1"),
     ],
 )
 def test_damaged_clouds(tmp_path, name, text, says):
@@ -159,10 +156,10 @@ def ply(colors="u1", top=255, order="little", before="", after=""):
     return write
 
 
-def las(name, point_format, version="1.4", top=65535):
+def las(name, point_format, top=65535):
     def write(folder):
         laspy = pytest.importorskip("laspy")
-        header = laspy.LasHeader(point_format=point_format, version=version)
+        header = laspy.LasHeader(point_format=point_format, version="1.4")
         header.offsets, header.scales = np.floor(XYZ.min(axis=0)), [1e-4] * 3
         header.add_extra_dim(laspy.ExtraBytesParams("label", type="int32"))
         data = laspy.LasData(header)
@@ -189,17 +186,13 @@ def open3d(name, **options):
 
 FILES = {
     "PLY": ply(),
-    "PLY big-endian": ply(order="big"),
-    "PLY, colours of 16 bits": ply("u2", 40000),
-    "PLY, colours of 8 bits in 16": ply("u2", 255),
+    "PLY big-endian": ply("u2", 40000, order="big"),
     "PLY, float colours": ply("f4", 1),
     "PLY, something before": ply(before="element camera 1\nproperty double focus\n"),
     "PLY, no faces": ply(after="element face 0\nproperty list uchar int vertex_indices\n"),
     "PCD": open3d("c.pcd"),
     "PCD text": open3d("c.pcd", write_ascii=True),
-    "LAS 1.2": las("c.las", 3, "1.2"),
     "LAS": las("c.las", 7),
-    "LAS, colours of 8 bits": las("c.las", 7, top=255),
     "LAS, colours unset": las("c.las", 7, top=0),
     "LAZ": las("c.laz", 6),
     "LAZ, colours of 8 bits": las("c.LAZ", 7, top=200),
@@ -246,7 +239,7 @@ def test_other_files_are_one_block(tmp_path, name):
     assert_same(list(read_blocks(path, rows=10)), read_scan(path))
 
 
-def test_conditions_and_sizes_of_blocks_that_make_no_sense(tmp_path):
+def test_conditions_that_make_no_sense(tmp_path):
     path = FILES["PLY"](tmp_path)
     with pytest.raises(InvalidCloudError, match="no point with x > 500000"):
         list(read_blocks(path, rows=7, where="x > 500000"))
@@ -254,9 +247,6 @@ def test_conditions_and_sizes_of_blocks_that_make_no_sense(tmp_path):
         list(read_blocks(path, rows=7, where="colour == 1"))
     with pytest.raises(InvalidParameterError, match=r"x = 1.*write such as"):
         read_blocks(path, where="x = 1")
-    for rows in (0, 2.5, True):
-        with pytest.raises(InvalidParameterError, match="rows ="):
-            read_blocks(path, rows=rows)
 
 
 OTHERS = {

@@ -1,7 +1,5 @@
 """The table of formats: what is true of all of them."""
 
-import re
-
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -64,9 +62,7 @@ def test_broken_off_files(tree, tmp_path, ending):
             back = read_skeleton(path)
         except FileFormatError:
             continue
-        assert ending in (".obj", ".swc", ".cgal", ".polylines.txt"), (
-            "only a format of independent lines can end anywhere"
-        )
+        assert ending in (".obj", ".swc", ".cgal"), "only a format of independent lines can end anywhere"
         assert len(back.vertices) <= len(tree.vertices)
 
 
@@ -121,7 +117,7 @@ def test_damaged_files(tmp_path, ending):
 
 def test_endings(tree, tmp_path, assert_identical):
     for name in ("s.vtk", "s", "s.txt"):
-        with pytest.raises(FileFormatError, match=r"\.ply.*\.obj.*\.json.*\.polylines\.txt"):
+        with pytest.raises(FileFormatError, match=r"\.ply.*\.obj.*\.json.*\.cgal"):
             save_skeleton(tree, tmp_path / name)
     with pytest.raises(FileFormatError, match="format 'vtk'"):
         save_skeleton(tree, tmp_path / "s.ply", format="vtk")
@@ -131,28 +127,6 @@ def test_endings(tree, tmp_path, assert_identical):
     for format in ("npz", ".NPZ"):
         save_skeleton(tree, tmp_path / "s.bak", format=format)
         assert_identical(read_skeleton(tmp_path / "s.bak", format=format), tree)
-
-
-def test_failure_keeps_the_old_file_and_leaves_nothing(tree, tmp_path, monkeypatch):
-    with pytest.raises(FileNotFoundError, match=r"missing.*folder.*s\.ply"):
-        save_skeleton(tree, tmp_path / "missing" / "s.ply")
-    path = tmp_path / "s.ply"
-    path.write_text("old")
-
-    def fail(*_):
-        raise OSError("disk full")
-
-    def half(path, data):
-        path.touch()
-        fail()
-
-    for name, broken in (("os.replace", fail), ("pathlib.Path.write_bytes", half)):
-        with monkeypatch.context() as patch:
-            patch.setattr(name, broken)
-            with pytest.raises(OSError, match="disk full"):
-                save_skeleton(tree, path)
-    assert [file.name for file in tmp_path.iterdir()] == [path.name]
-    assert path.read_text() == "old"
 
 
 @pytest.mark.parametrize("ending", [".ply", ".obj"])
@@ -179,20 +153,7 @@ def test_whether_a_file_holds_a_skeleton(skeleton, tmp_path, ending):
     assert holds_skeleton(tmp_path / f"s{ending}")
 
 
-def test_every_format_stands_in_the_docstring():
-    for ending in FORMATS:
-        assert re.search(rf"^ *[\w., ]*\{ending}\b", save_skeleton.__doc__, re.MULTILINE)
-
-
 def test_edges_of_others_are_sorted_and_each_is_there_once():
     skeleton = graph_skeleton(np.eye(4)[:, :3], [[3, 2], [1, 0], [0, 1], [2, 2]])
     np.testing.assert_array_equal(skeleton.edges, [[0, 1], [2, 3]])
     assert graph_skeleton([], []).vertices.shape == (0, 3)
-
-
-def test_an_error_does_not_repeat_the_file(tmp_path):
-    path = tmp_path / "s.swc"
-    path.write_text("1 0 " + 5000 * "x" + " 0 0 1 -1\n")
-    with pytest.raises(FileFormatError, match=r"s\.swc: not a valid \.swc skeleton: .*x") as caught:
-        read_skeleton(path)
-    assert len(str(caught.value)) < 600

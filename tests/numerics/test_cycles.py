@@ -53,27 +53,6 @@ def test_random_graphs(n, density, seed, whole):
     np.testing.assert_allclose(basis_of(graph)[1], expected(graph))
 
 
-@pytest.mark.parametrize(
-    ("graph", "lengths"),
-    [
-        (nx.complete_graph(6), [3] * 10),
-        (nx.grid_2d_graph(5, 4), [4] * 12),
-        (nx.petersen_graph(), [5] * 6),
-        (nx.cubical_graph(), [4] * 5),
-        (nx.ladder_graph(30), [4] * 29),
-        (nx.disjoint_union(nx.cycle_graph(3), nx.cycle_graph(8)), [3, 8]),
-        (nx.barbell_graph(3, 4), [3, 3]),
-        (nx.Graph([(0, 2), (2, 1), (0, 3), (3, 1), (0, 4), (4, 5), (5, 1)]), [4, 5]),
-        (nx.balanced_tree(3, 3), []),
-    ],
-    ids=["complete", "grid", "petersen", "cube", "ladder", "two rings", "barbell", "theta", "tree"],
-)
-def test_known_graphs(graph, lengths):
-    graph = nx.convert_node_labels_to_integers(graph)
-    nx.set_edge_attributes(graph, 1.0, "weight")
-    assert basis_of(graph)[1] == lengths
-
-
 # ---- the circle inside
 
 ANGLE = np.linspace(0, 2 * np.pi, 60, endpoint=False)

@@ -1,4 +1,4 @@
-"""The ring kernel against scipy's Delaunay triangulation, and against convex hulls in exact arithmetic."""
+"""The ring kernel against convex hulls in exact arithmetic; test_ring_builder.py has SciPy's Delaunay."""
 
 from fractions import Fraction
 
@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.spatial import Delaunay
 
 from glsk_o3d.numerics.delaunay_star import delaunay_star
 
@@ -16,21 +15,6 @@ def star(offsets, valid=None):
     valid = None if valid is None else np.asarray(valid)[None]
     ring, closed = delaunay_star(np.asarray(offsets, float)[None], valid)
     return ring[0][ring[0] >= 0].tolist(), bool(closed[0])
-
-
-def links(ring, closed):
-    """Unordered pairs of consecutive neighbours."""
-    following = ring[1:] + ring[:1] if closed else ring[1:]
-    return {frozenset(pair) for pair in zip(ring, following, strict=False)}
-
-
-def triangulated_star(offsets):
-    """The same from a Delaunay triangulation: links of the centre, and whether it is off the hull."""
-    triangulation = Delaunay(np.vstack([offsets, [0, 0]]))
-    centre = len(offsets)
-    triangles = triangulation.simplices[(triangulation.simplices == centre).any(axis=1)]
-    opposite = {frozenset(set(triangle) - {centre}) for triangle in triangles.tolist()}
-    return opposite, centre not in triangulation.convex_hull
 
 
 def exact_star(offsets, valid):
@@ -73,54 +57,6 @@ def turned(sequence):
     """A cyclic sequence from its least element."""
     at = sequence.index(min(sequence))
     return sequence[at:] + sequence[:at]
-
-
-# ---- thousands of neighbourhoods in general position
-
-
-def neighbourhoods(kind, n=300, k=14):
-    rng = np.random.default_rng(len(kind))
-    cloud = rng.normal(size=(n, k, 2))
-    if kind == "stretched":
-        cloud *= [1, 1e-3]
-    elif kind == "border":
-        cloud[..., 1] = np.abs(cloud[..., 1])
-    elif kind == "corner":
-        cloud = np.abs(cloud)
-    elif kind == "graded":
-        cloud *= 10 ** rng.uniform(-4, 0, (n, k, 1))
-    elif kind == "arc":
-        angle = rng.uniform(0, 1.7 * np.pi, (n, k))
-        cloud = np.stack([np.cos(angle), np.sin(angle)], -1) * rng.uniform(0.9, 1.1, (n, k, 1))
-    elif kind == "thin ring":  # all but cocircular
-        cloud /= np.linalg.norm(cloud, axis=2, keepdims=True)
-        cloud += 1e-4 * rng.normal(size=cloud.shape)
-    elif kind == "jittered grid":
-        grid = np.stack(np.meshgrid([-2, -1, 0, 1, 2], [-2, -1, 0, 1, 2]), -1).reshape(-1, 2)
-        grid = grid[np.abs(grid).sum(axis=1) > 0]
-        cloud = grid + 1e-3 * rng.normal(size=(n, len(grid), 2))
-    return cloud
-
-
-KINDS = ("plain", "stretched", "border", "corner", "graded", "arc", "thin ring", "jittered grid")
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_against_triangulations(kind):
-    """Counter-clockwise; a closed ring starts with the nearest neighbour."""
-    cloud = neighbourhoods(kind)
-    rings, closed = delaunay_star(cloud)
-    assert closed.any() == (kind not in ("border", "corner"))
-    for offsets, row, is_closed in zip(cloud, rings.tolist(), closed.tolist(), strict=True):
-        ring = [j for j in row if j >= 0]
-        assert (links(ring, is_closed), is_closed) == triangulated_star(offsets)
-        following = np.roll(offsets[ring], -1, axis=0)
-        cross = offsets[ring, 0] * following[:, 1] - offsets[ring, 1] * following[:, 0]
-        assert (cross[: None if is_closed else -1] > 0).all()
-        assert not is_closed or row[0] == np.argmin((offsets**2).sum(axis=1))
-
-
-# ---- degenerate neighbourhoods, by hand
 
 
 # ---- degenerate neighbourhoods, by the thousand: small integers are often collinear, cocircular, doubled

@@ -70,13 +70,6 @@ def test_refinement_mends_what_the_factorisation_misses():
     assert np.abs(x - expected).max() / size < 1e-7
 
 
-def test_different_weights_in_every_row():
-    laplacian, points, _ = small_system("torus")
-    rows, attraction = np.random.default_rng(2).uniform(1e-3, 1, (2, len(points))) * [[50], [1]]
-    x, _ = solve_contraction(laplacian, rows, attraction, points)
-    np.testing.assert_allclose(x, least_squares(laplacian, rows, attraction, points), atol=1e-9)
-
-
 @pytest.mark.parametrize(
     "spoil",
     [

@@ -7,12 +7,6 @@ from glsk_o3d.numerics.vectors import dot, norm
 RNG = np.random.default_rng(0)
 
 
-def test_against_numpy():
-    a, b = RNG.normal(size=(2, 100, 3))
-    np.testing.assert_allclose(dot(a, b), (a * b).sum(axis=1), rtol=1e-14, atol=1e-15)
-    np.testing.assert_allclose(norm(a), np.linalg.norm(a, axis=1), rtol=1e-14)
-
-
 def test_rows_do_not_depend_on_each_other():
     """Bit for bit, so that skeletons do not depend on the order of the points."""
     a, b = RNG.normal(size=(2, 1001, 3))

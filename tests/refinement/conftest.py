@@ -91,17 +91,17 @@ def off_axis(points, path):
 
 @pytest.fixture(scope="session")
 def piped():
-    """A skeleton in the axes of tubes: the vertices of the lines, those at one place once, and tubes around some lines.
+    """A skeleton of lines, its vertices at one place once, and tubes around them or around other lines.
 
     Normals have either sign. Of a tube what is inside of another is left out.
     """
 
-    def make(lines, tubes=None, radius=0.1, step=0.05, spacing=0.03, side=None):
+    def make(lines, around=None, radius=0.1, step=0.05, spacing=0.03, side=None):
         paths = [
             np.concatenate([corners[:1], *(line(a, b, step)[1:] for a, b in pairwise(corners))])
             for corners in (np.asarray(corners, float) for corners in lines)
         ]
-        tubes = range(len(lines)) if tubes is None else tubes
+        axes = paths if around is None else [np.asarray(corners, float) for corners in around]
         vertices, which = np.unique(np.concatenate(paths).round(9), axis=0, return_inverse=True)
         edges, first = set(), 0
         for path in paths:
@@ -109,9 +109,9 @@ def piped():
             edges |= {(min(a, b), max(a, b)) for a, b in pairwise(names)}
             first += len(path)
         points, normals = [], []
-        for k in tubes:
-            surface, outward = pipe(paths[k], radius, spacing, side, seed=k)
-            others = [off_axis(surface, paths[other]) > 0.99 * radius for other in tubes if other != k]
+        for k, axis in enumerate(axes):
+            surface, outward = pipe(axis, radius, spacing, side, seed=k)
+            others = [off_axis(surface, other) > 0.99 * radius for other in axes if other is not axis]
             free = np.all([np.full(len(surface), True), *others], axis=0)
             points.append(surface[free])
             normals.append(outward[free])

@@ -78,11 +78,6 @@ def test_names_the_region_that_is_weakly_supported(refine):
     np.testing.assert_allclose([float(c) for c in place.split(",")], [10_000, 0, 0], atol=100)
 
 
-def test_the_cure_for_a_table_is_said(refine):
-    (message,) = refine(skeleton_of(sheet(600), torus(400))).report.warnings
-    assert "segment_plane or read_cloud(..., where='z > ...')" in message
-
-
 def test_one_reason_is_enough(refine):
     angle, x = np.random.default_rng(2).uniform([[0], [-1]], [[2 * np.pi], [1]], (2, 800))
     normals = np.column_stack([0 * angle, np.cos(angle), np.sin(angle)])

@@ -6,50 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from glsk_o3d import Skeleton
-from glsk_o3d.numerics.polylines import arc_lengths
-
 R = 0.1
-
-
-def capsules(ends, per=3000):
-    """Points on the surface of struts of radius R with round ends, but not inside another, and normals, (N, 3) each."""
-    rng, points, normals = np.random.default_rng(0), [], []
-    for a, b in np.asarray(ends, float):
-        t = rng.uniform(-R, np.linalg.norm(b - a) + R, per)
-        way = (b - a) / np.linalg.norm(b - a)
-        foot = np.clip(t, 0, np.linalg.norm(b - a))
-        side = np.cross(way, rng.normal(size=(per, 3)))
-        side /= np.linalg.norm(side, axis=1, keepdims=True)
-        along = t - foot
-        out = along[:, None] * way + np.sqrt(R**2 - along**2)[:, None] * side
-        points.append(a + foot[:, None] * way + out)
-        normals.append(out / R)
-    points, normals = np.concatenate(points), np.concatenate(normals)
-    for a, b in np.asarray(ends, float):
-        t = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
-        outside = np.linalg.norm(a + t[:, None] * (b - a) - points, axis=1) > R * (1 - 1e-6)
-        points, normals = points[outside], normals[outside]
-    return points, normals
-
-
-def drawn(paths, struts):
-    """A skeleton of polylines whose ends at equal places are one vertex; points belong to the nearest vertex."""
-    vertices, edges, places = [], [], {}
-    for path in paths:
-        along = arc_lengths(np.array(path, float))
-        steps = np.linspace(0, along[-1], max(int(along[-1] / (R / 2)), 2) + 1)
-        numbers = []
-        for place in np.column_stack([np.interp(steps, along, x) for x in np.array(path, float).T]):
-            key = tuple(place.round(9))
-            if key not in places:
-                places[key] = len(vertices)
-                vertices.append(place)
-            numbers.append(places[key])
-        edges += [sorted(pair) for pair in pairwise(numbers)]
-    points, normals = capsules(struts)
-    owner = cKDTree(vertices).query(points)[1]
-    return Skeleton(vertices, sorted(edges), np.full(len(vertices), R), owner, points, normals)
 
 
 def towards(angle, length=1.0):
@@ -67,20 +24,20 @@ def webbed(angles):
 
 
 @pytest.mark.parametrize("half", [20, 45])
-def test_a_sharp_corner_has_no_spur(refine, half):
+def test_a_sharp_corner_has_no_spur(piped, refine, half):
     """Two struts that meet in a V: the spur into its tip goes, and what is left is one path."""
     paths, struts, meet = webbed([-half, half])
-    raw = drawn([*paths, [meet, [-R / 2, 0, 0]]], struts)
+    raw = piped([*paths, [meet, [-R / 2, 0, 0]]], struts)
     assert len(raw.leaves) == 3
     skeleton = refine(raw, limb=0.25)
     assert (len(skeleton.leaves), len(skeleton.junctions), skeleton.n_components) == (2, 0, 1)
 
 
 @pytest.mark.parametrize("angles", [[-30, 30, 180], [-40, 40, 0], [0, 90, 180], [45, 135, 225, 315]])
-def test_junctions_move_to_where_the_axes_meet(refine, angles):
+def test_junctions_move_to_where_the_axes_meet(piped, refine, angles):
     """Y, three struts in a fan, T and four in a plane."""
     paths, struts, meet = webbed(angles)
-    skeleton = refine(drawn(paths, struts), recentre=3)
+    skeleton = refine(piped(paths, struts), recentre=3)
     assert (len(skeleton.junctions), len(skeleton.leaves)) == (1, len(angles))
     assert np.linalg.norm(skeleton.vertices[skeleton.junctions[0]]) < 0.3 * R < np.linalg.norm(meet)
     # and the limbs are straight from there on
@@ -91,19 +48,19 @@ def test_junctions_move_to_where_the_axes_meet(refine, angles):
 
 
 @pytest.mark.parametrize(("apart", "junctions"), [(1.0, 1), (4.0, 2)])
-def test_junctions_of_one_corner_become_one(refine, apart, junctions):
+def test_junctions_of_one_corner_become_one(piped, refine, apart, junctions):
     """Four limbs that the contraction joins at two places; of two that are apart each stays."""
     a, b = np.array([-apart * R / 2, 0, 0]), np.array([apart * R / 2, 0, 0])
     ends = [towards(120), towards(240), towards(0), towards(90)]
     root = [a, a, b, b] if apart > 2 else [np.zeros(3)] * 4
     struts = [(r, r + end) for r, end in zip(root, ends, strict=True)] + [(a, b)]
     paths = [[start, r + 3 * R * end, r + end] for start, r, end in zip([a, a, b, b], root, ends, strict=True)]
-    skeleton = refine(drawn([*paths, [a, b]], struts), recentre=3)
+    skeleton = refine(piped([*paths, [a, b]], struts), recentre=3)
     assert (len(skeleton.junctions), len(skeleton.leaves)) == (junctions, 4)
 
 
 @pytest.fixture(scope="module")
-def quadruped():
+def quadruped(piped):
     """A trunk along x with a pair of legs at either end; the front legs join it .8 radii apart."""
     back, front, shift = np.array([-0.5, 0, 0]), np.array([0.5, 0, 0]), np.array([0.4 * R, 0, 0])
     hips, roots = [back, back, front, front], [back, back, front - shift, front + shift]
@@ -111,7 +68,7 @@ def quadruped():
     struts = [((-1, 0, 0), (1, 0, 0)), *zip(hips, feet, strict=True)]
     paths = [*pairwise([(-1, 0, 0), back, *roots[2:], (1, 0, 0)])]
     paths += [(root, hip + 0.2 * (foot - hip), foot) for root, hip, foot in zip(roots, hips, feet, strict=True)]
-    return drawn(paths, struts)
+    return piped(paths, struts, step=R / 2, spacing=0.01)
 
 
 def test_limbs_that_meet_a_trunk_within_a_radius_share_a_junction(refine, quadruped):
@@ -127,8 +84,8 @@ def test_limbs_that_meet_a_trunk_within_a_radius_share_a_junction(refine, quadru
     assert cKDTree(curve).query(skeleton.vertices * [1, -1, 1])[0].max() < 0.2 * R
 
 
-def test_two_limbs_side_by_side_do_not_close_a_loop(refine):
+def test_two_limbs_side_by_side_do_not_close_a_loop(piped, refine):
     """A ring no wider than the radius of its limbs keeps both its sides."""
     ring = [((0, 0, 0), (R / 4, s * R, 0), (R / 2, 0, 0)) for s in (-1, 1)]
     tails = [((0, 0, 0), (-1, 0, 0)), ((R / 2, 0, 0), (1, 0, 0))]
-    assert refine(drawn([*ring, *tails], tails), recentre=3).n_loops == 1
+    assert refine(piped([*ring, *tails], tails), recentre=3).n_loops == 1

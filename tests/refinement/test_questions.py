@@ -54,9 +54,7 @@ def strands(piped, gap, length, **options):
     """A tube with two strands in it that meet at both ends."""
     a, b = length / 2, length / 2 - 0.05
     middle = [[(-a, 0, 0), (-b, y, 0), (b, y, 0), (a, 0, 0)] for y in (-gap / 2, gap / 2)]
-    around, raw = piped(TUBE, **options), piped([*middle, [(-1, 0, 0), (-a, 0, 0)], [(a, 0, 0), (1, 0, 0)]])
-    owner = np.argmin(np.linalg.norm(around.points[:, None] - raw.vertices, axis=2), axis=1)
-    return replace(raw, points=around.points, normals=around.normals, vertex_of_point=owner)
+    return piped([*middle, [(-1, 0, 0), (-a, 0, 0)], [(a, 0, 0), (1, 0, 0)]], around=TUBE, **options)
 
 
 @SIDES
@@ -125,14 +123,14 @@ def test_limbs_do_not_depend_on_how_the_object_is_turned(refine, placed):
     np.testing.assert_allclose(sure, also, atol=1e-6)
 
 
-def twig(piped, reach, tubes=None):
+def twig(piped, reach, around=None):
     """A tube and an edge path from its middle, `reach` radii long."""
-    return piped([[(-1, 0, 0), (0, 0, 0), (1, 0, 0)], [(0, 0, 0), (0, 0.1 * reach, 0)]], tubes=tubes)
+    return piped([[(-1, 0, 0), (0, 0, 0), (1, 0, 0)], [(0, 0, 0), (0, 0.1 * reach, 0)]], around)
 
 
 def test_a_branch_is_a_limb_as_far_as_its_points_reach(piped, refine):
     """However long its curve is."""
-    assert counts(refine(twig(piped, 5, tubes=[0]), limb=0.25)) == (1, 0, 2)
+    assert counts(refine(twig(piped, 5, TUBE), limb=0.25)) == (1, 0, 2)
     found = []
     for reach in (0.8, 1.5, 2, 3, 5):
         skeleton = refine(twig(piped, reach), limb=1e-9)
@@ -165,7 +163,7 @@ def test_what_ends_nowhere_is_no_spur(piped, refine):
     """A tiny ring on a stem, two ways between two junctions, and a path shorter than it is thick."""
     tiny = [(0, 0, 0.02), (0.01, 0, 0.03), (0, 0, 0.04), (-0.01, 0, 0.03), (0, 0, 0.02)]
     ring = [[(-1, 0, 0), (0, 0, 0), (1, 0, 0)], [(0, 0, 0), (0, 0, 0.02)], tiny]
-    for raw in (piped(ring, tubes=[0]), strands(piped, 0.04, 0.2), piped([[(0, 0, 0), (0.05, 0, 0)]])):
+    for raw in (piped(ring, TUBE), strands(piped, 0.04, 0.2), piped([[(0, 0, 0), (0.05, 0, 0)]])):
         assert_unchanged(refine(raw, limb=0.25), raw)
 
 
@@ -183,7 +181,7 @@ def test_of_a_fork_of_short_limbs_the_better_two_stay(piped, refine):
 
 @pytest.mark.parametrize("noise", [0.0, 0.5])
 def test_an_edge_between_two_tubes_is_cut(piped, refine, noise):
-    raw = replace(piped(ACROSS, tubes=[0, 1]), report=Report(noise=noise))
+    raw = replace(piped(ACROSS, ACROSS[:2]), report=Report(noise=noise))
     skeleton = refine(raw, air=0.5, limb=0.5)
     assert (raw.n_components, counts(skeleton), skeleton.report.n_cuts) == (1, (2, 0, 4), 1)
     (false,) = (it for it in skeleton.report.decisions if it.about == "air" and it.changed)

@@ -1,7 +1,7 @@
 """BVH, the files of motion capture: an armature and its frames, here one, at rest.
 
-The first line of each bone is its name; its frame is not turned. As in Blender's files the root's offset is its place,
-and its position in the frame is the same. y points up, and units are the cloud's.
+As in Blender's files the root's offset is its place, and its position in the frame is the same. y points up, and units
+are the cloud's.
 """
 
 import numpy as np

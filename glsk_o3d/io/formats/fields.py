@@ -7,7 +7,6 @@ report is a string of JSON.
 import io
 import json
 import math
-import zipfile
 from collections.abc import Iterable
 from contextlib import suppress
 from typing import Any
@@ -19,8 +18,6 @@ from ...skeleton import ARRAYS, Skeleton
 from ..paths import check_budget, check_promised
 
 FORMAT, FORMAT_VERSION = "glsk-o3d skeleton", 1
-LATER = ("half_width", "half_thickness", "support")
-"""Those that older files lack."""
 
 
 def write_json(skeleton: Skeleton) -> bytes:
@@ -49,20 +46,16 @@ def read_npz(data: bytes) -> Skeleton:
 
 
 def npz_arrays(data: bytes, names: Iterable[str]) -> dict[str, Any]:
-    """Those arrays of an npz archive that it has; ValueError where one promises more than there is, or is pickled."""
-    arrays, form = {}, np.lib.format
-    with zipfile.ZipFile(io.BytesIO(data)) as packed:
-        check_budget(sum(info.file_size for info in packed.infolist()), len(data))
-        for name in {*packed.namelist()} & {f"{name}.npy" for name in names}:
-            held = io.BytesIO(packed.read(name))
-            read = form.read_array_header_1_0 if form.read_magic(held) == (1, 0) else form.read_array_header_2_0
-            shape, _, kind = read(held)
-            check_promised(math.prod(shape) * kind.itemsize, len(held.getbuffer()) - held.tell(), f"bytes of {name}")
-            held.seek(0)
-            try:
-                arrays[name[:-4]] = np.load(held, allow_pickle=False)
-            except ValueError as error:
-                raise ValueError(f"{name[:-4]}: {error}") from error
+    """Those arrays of an npz archive that it has; ValueError where they are pickled, or unpack to more than memory."""
+    arrays: dict[str, Any] = {}
+    with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+        check_budget(sum(info.file_size for info in archive.zip.infolist()), len(data))
+        for name in {*names} & {*archive}:
+            with archive.zip.open(f"{name}.npy") as held:
+                np.lib.format.read_magic(held)
+                shape, _, kind = np.lib.format.read_array_header_1_0(held)
+                check_promised(math.prod(shape) * kind.itemsize, archive.zip.getinfo(f"{name}.npy").file_size, name)
+            arrays[name] = archive[name]
     return arrays
 
 
@@ -81,7 +74,6 @@ def _decode(values: Any) -> Skeleton:
         raise ValueError(f"it is not marked as a {FORMAT!r}")
     if (version := values.get("format_version")) != FORMAT_VERSION:
         raise ValueError(f"it has format_version {version!r} and this release reads {FORMAT_VERSION}: update glsk-o3d")
-    values = dict.fromkeys(LATER, ()) | values
     missing = [name for name in (*ARRAYS, "report") if name not in values]
     if missing:
         raise ValueError(f"it lacks {', '.join(missing)}")

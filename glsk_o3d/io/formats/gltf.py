@@ -4,6 +4,7 @@ Blender and other programs for animation open it. Bones are called by their bran
 numbers are float32, as glTF's are; of coordinates as on a map the large part is a shift of the whole.
 """
 
+import json
 import os
 from pathlib import Path
 from typing import Any
@@ -15,21 +16,22 @@ from ...analysis.segmentation import vertex_of_cloud
 from ...errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ...interop.atomic import check_ending, write_atomically
 from ...interop.clouds import cloud_points, open3d_class
+from ...interop.packages import import_open3d
 from ...numerics.vectors import norm, unit
 from ...refinement.rooted import RootPlace
 from ...skeleton import Skeleton
 from ..geometry import to_tubes
 from . import bvh
-from .glb import binary, embedded
 from .graphs import as_forest, global_shift, holding_all
 
-RIG_ENDINGS = (".glb", ".gltf", ".bvh")
+MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942  # published: glTF 2.0, 4.4
 COMPONENT_TYPES = {"f4": 5126, "u2": 5123, "u4": 5125}  # published: glTF 2.0, 3.6.2.2
+POINTS_MODE, TRIANGLES_MODE = 0, 4  # published: glTF 2.0, 5.24
+RIG_ENDINGS = (".glb", ".bvh")
 MOST_JOINTS = 65535  # published: glTF 2.0, 3.7.3.3, in which joints are counted in 16 bits at most
 # derived: float32 holds its parts, and they sum to 1 exactly: else far from the origin points move
 WEIGHT_STEPS = 2**16
 SRGB_KNEE = 0.04045  # published: IEC 61966-2-1, where the curve of sRGB begins
-POINTS_MODE, TRIANGLES_MODE = 0, 4  # published: glTF 2.0, 5.24
 UPRIGHT = {"z": [-(0.5**0.5), 0.0, 0.0, 0.5**0.5], "y": [0.0, 0.0, 0.0, 1.0]}  # derived: turns up into glTF's y
 
 
@@ -45,15 +47,13 @@ def save_rig(
     """Write a mesh or a cloud with a skeleton's armature that moves it, as glTF; or the armature alone, as BVH.
 
     Joints are the junctions, the places where limbs leave a junction's ball, and vertices between that are a radius
-    apart or more. Each edge between joints is a bone. It turns about the end nearer to the root, so every branch turns
-    by itself. Within one and a half radii of a joint the motion of a point blends from bone to bone.
+    apart or more. Each edge between joints is a bone, which turns about the end nearer to the root.
 
     Parameters
     ----------
     skeleton : Skeleton
     path : path-like
-        Ends in ``.glb``, in ``.gltf``, which is text with all in it, or in ``.bvh``: a hierarchy and one frame, at
-        rest, in the cloud's units.
+        Ends in ``.glb``, or in ``.bvh``: a hierarchy and one frame, at rest, in the cloud's units.
     mesh : triangle mesh or cloud, optional
         Of Open3D, or anything that carries points. By default the skeleton's tubes, or if it has no radii, its points.
     cut_loops : bool
@@ -61,7 +61,7 @@ def save_rig(
     root : str, int or (x, y, z), optional
         Which joint moves all others; as for `glsk_o3d.editing.reroot`. By default that of `branch_table`.
     up : {"z", "y"}
-        The vertical axis of the data. It is y in the files, and programs convert it.
+        The vertical axis of the data. It is y in the file, and programs convert it.
 
     Returns
     -------
@@ -88,25 +88,21 @@ def save_rig(
     True
     """
     check_ending(path, "rig is glTF or BVH", *RIG_ENDINGS)
-    ending = Path(path).suffix.lower()
+    alone = Path(path).suffix.lower() == ".bvh"
     if up not in UPRIGHT:
         raise InvalidParameterError(f"up = {up!r}: must be one of {', '.join(UPRIGHT)}")
-    if ending == ".bvh" and mesh is not None:
-        raise InvalidParameterError("a .bvh file holds no surface: leave the mesh out, or write .glb or .gltf")
+    if alone and mesh is not None:
+        raise InvalidParameterError("a .bvh file holds no surface: leave the mesh out, or write .glb")
     with holding_all(path):
         bones = armature(_with_edges(as_forest(skeleton, cut_loops, root)))
-        if ending == ".bvh":
-            data = bvh.content(bones, up)
-        else:
-            pack = binary if ending == ".glb" else embedded
-            data = pack(*_content(bones, _surface(skeleton) if mesh is None else mesh, up))
+        data = bvh.content(bones, up) if alone else _content(bones, _surface(skeleton) if mesh is None else mesh, up)
     write_atomically(path, lambda temporary: temporary.write_bytes(data))
     return bones
 
 
 def write(forest: Skeleton) -> bytes:
     """The content of a GLB file: the tubes of a skeleton that is numbered from its roots outwards, and its armature."""
-    return binary(*_content(_with_edges(forest), _surface(forest), "z"))
+    return _content(_with_edges(forest), _surface(forest), "z")
 
 
 def _with_edges(forest: Skeleton) -> Skeleton:
@@ -123,8 +119,8 @@ def _surface(skeleton: Skeleton) -> Any:
     return skeleton.points[skeleton.vertex_of_point >= 0]
 
 
-def _content(forest: Skeleton, mesh: Any, up: str) -> tuple[dict[str, Any], bytearray]:
-    """The tree of a glTF file, and its buffer."""
+def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
+    """The content of a GLB file."""
     if len(forest.edges) > MOST_JOINTS:
         raise FileFormatError(f"glTF counts at most {MOST_JOINTS} bones, not {len(forest.edges)}: simplify it first")
     points = cloud_points(mesh)
@@ -160,35 +156,29 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> tuple[dict[str, Any], byte
         "rotation": UPRIGHT[up],
     }
     n, at_rest = len(nodes), buffer.add(inverse.transpose(0, 2, 1).reshape(-1, 16), "f4", "MAT4")
-    tree = {
-        "asset": {"version": "2.0", "generator": "glsk-o3d"},
-        "scene": 0,
-        "scenes": [{"nodes": [n, n + 1]}],
-        "nodes": [*nodes, armature, {"name": "surface", "mesh": 0, "skin": 0}],
-        "meshes": [{"primitives": [primitive]}],
-        "skins": [{"joints": list(range(n)), "skeleton": n, "inverseBindMatrices": at_rest}],
-        "accessors": buffer.accessors,
-        "bufferViews": buffer.views,
-        "buffers": [{"byteLength": len(buffer.data)}],
-    }
-    return tree, buffer.data
+    return buffer.file(
+        {
+            "scene": 0,
+            "scenes": [{"nodes": [n, n + 1]}],
+            "nodes": [*nodes, armature, {"name": "surface", "mesh": 0, "skin": 0}],
+            "meshes": [{"primitives": [primitive]}],
+            "skins": [{"joints": list(range(n)), "skeleton": n, "inverseBindMatrices": at_rest}],
+        }
+    )
 
 
 def _looks(mesh: Any, n: int) -> dict[str, np.ndarray]:
     """Normals and colours, where there is one of each vertex; colours are linear in glTF."""
-    name, tensor = open3d_class(mesh)
-    if name not in ("PointCloud", "TriangleMesh"):
+    kind, tensor = open3d_class(mesh)
+    if kind not in ("PointCloud", "TriangleMesh"):
         return {}
-    held = (mesh.vertex if name == "TriangleMesh" else mesh.point) if tensor else {}
-    start, found = "vertex_" if name == "TriangleMesh" else "", {}
-    normals, colors = (
-        held[key].cpu().numpy() if key in held else np.asarray(getattr(mesh, f"{start}{key}", np.empty((0, 3))))
-        for key in ("normals", "colors")
-    )
-    if len(normals) == n and (norm(normals) > 0).all():
-        found["NORMAL"] = unit(normals)
-    if len(colors) == n:
-        shades = colors / 255 if colors.dtype == np.uint8 else colors
+    geometry = mesh if tensor else getattr(import_open3d().t.geometry, kind).from_legacy(mesh)
+    held, found = geometry.vertex if kind == "TriangleMesh" else geometry.point, {}
+    looks = {name: held[name].cpu().numpy() for name in ("normals", "colors") if name in held and len(held[name]) == n}
+    if "normals" in looks and (norm(looks["normals"]) > 0).all():
+        found["NORMAL"] = unit(looks["normals"])
+    if "colors" in looks:
+        shades = looks["colors"] / 255 if looks["colors"].dtype == np.uint8 else looks["colors"]
         found["COLOR_0"] = np.where(shades <= SRGB_KNEE, shades / 12.92, ((shades + 0.055) / 1.055) ** 2.4)
     return found
 
@@ -224,3 +214,16 @@ class _Buffer:
         self.accessors.append({**facts, "type": shape, **limits})
         self.data += array.tobytes()
         return len(self.accessors) - 1
+
+    def file(self, tree: dict[str, Any]) -> bytes:
+        """A binary file of what a tree says beside the arrays."""
+        tree |= {"accessors": self.accessors, "bufferViews": self.views, "buffers": [{"byteLength": len(self.data)}]}
+        tree |= {"asset": {"version": "2.0", "generator": "glsk-o3d"}}
+        text = json.dumps(tree, separators=(",", ":"), allow_nan=False).encode()
+        text += b" " * (-len(text) % 4)
+        body = bytes(self.data) + bytes(-len(self.data) % 4)
+        chunks = b"".join(
+            len(chunk).to_bytes(4, "little") + kind.to_bytes(4, "little") + chunk
+            for kind, chunk in ((JSON_CHUNK, text), (BINARY_CHUNK, body))
+        )
+        return b"".join(n.to_bytes(4, "little") for n in (MAGIC, 2, 12 + len(chunks))) + chunks

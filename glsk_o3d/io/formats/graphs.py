@@ -19,9 +19,6 @@ class NoEdges(Exception):
     """A file in a format that clouds have too holds no edges, and was not written as a skeleton."""
 
 
-# -------------------------------------------------------------------------------------------------------------- graphs
-
-
 def graph_skeleton(
     vertices: ArrayLike, edges: ArrayLike, radii: ArrayLike | None = None, **known: ArrayLike
 ) -> Skeleton:
@@ -33,9 +30,6 @@ def graph_skeleton(
     edges = np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0)
     none = np.empty(0)
     return Skeleton(vertices, edges, radii, vertex_of_point=none, points=none, normals=none, **known)  # type: ignore[arg-type]
-
-
-# --------------------------------------------------------------------------------------------------------------- trees
 
 
 def as_forest(skeleton: Skeleton, cut: bool, root: RootPlace | None) -> Skeleton:
@@ -88,9 +82,6 @@ def global_shift(skeleton: Skeleton) -> np.ndarray:
         return np.zeros(3)
     lost = np.abs(vertices).max(axis=0) * np.finfo(np.float32).eps > FLOAT32_SHARE * np.median(sizes)
     return np.where(lost, np.floor(vertices.min(axis=0)), 0.0)
-
-
-# ---------------------------------------------------------------------------------------------------------------- text
 
 
 def line(*words: object) -> str:

@@ -1,17 +1,16 @@
-"""OBJ, GraphML, CGAL's polylines, DXF and VTP: vertices and edges, or branches, to the last bit; no cloud, no report.
+"""OBJ, GraphML, CGAL's polylines and VTP: vertices and edges, or branches, to the last bit; no cloud, no report.
 
-OBJ has edges as ``l`` lines, for MeshLab, Blender and CloudCompare, and no radii; scans are OBJ files, too, and a
-skeleton is one that has lines. GraphML has x, y, z and radius of the nodes and the length of every edge, for networkx,
-Gephi and Cytoscape. CGAL's text has a line per branch, the number of its points and then x y z of each; on reading,
-polylines are joined where their ends have equal coordinates. DXF, release 12, has a 3D polyline per branch, closed for
-a loop without a junction. VTP, VTK's polydata, has the radii and confidences too, and the cell array ``branch`` counts
-the polylines. A vertex without edges is a polyline of one point, or a point.
+OBJ has edges as ``l`` lines, and no radii; scans are OBJ files, too, and a skeleton is one that has lines. GraphML has
+x, y, z and radius of the nodes and the length of every edge. CGAL's text has a line per branch, the number of its
+points and then x y z of each; on reading, polylines are joined where their ends have equal coordinates. VTP, VTK's
+polydata, has the radii and confidences too, and the cell array ``branch`` counts the polylines. A vertex without edges
+is a polyline of one point, or a point.
 """
 
 import base64
 import io
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from itertools import pairwise
 from typing import BinaryIO
 from xml.etree import ElementTree as xml
@@ -22,10 +21,8 @@ from ...interop.packages import require
 from ...skeleton import Skeleton
 from .graphs import NoEdges, graph_skeleton, line, text, words_by_line
 
-DXF_LAYER = "skeleton"
 _OBJ_MARK = b"# curve skeleton written by glsk-o3d"
 _KEYS = ("x", "y", "z", "radius")
-_CLOSED, _IN_SPACE, _VERTEX_IN_SPACE = 1, 8, 32  # published: DXF reference, group 70 of POLYLINE and of VERTEX
 _VTK_TYPES = {"f": "Float64", "i": "Int64"}
 
 
@@ -110,26 +107,6 @@ def read_cgal(data: bytes) -> Skeleton:
     label[ends] = ends[first][which.ravel()]
     kept, index = np.unique(label, return_inverse=True)
     return graph_skeleton(points[kept], index[np.column_stack([inner, inner + 1])])
-
-
-def write_dxf(skeleton: Skeleton) -> bytes:
-    """The content of a DXF file."""
-
-    def place(vertex: list[float]) -> Iterator[tuple[int, object]]:
-        return zip((10, 20, 30), vertex, strict=True)
-
-    groups: list[tuple[int, object]] = [(0, "SECTION"), (2, "HEADER"), (9, "$ACADVER"), (1, "AC1009"), (0, "ENDSEC")]
-    groups += [(0, "SECTION"), (2, "ENTITIES")]
-    for path in skeleton.branches:
-        closed = len(path) > 2 and bool((skeleton.vertices[path[0]] == skeleton.vertices[path[-1]]).all())
-        groups += [(0, "POLYLINE"), (8, DXF_LAYER), (66, 1), *place([0.0] * 3), (70, _IN_SPACE + _CLOSED * closed)]
-        for vertex in skeleton.vertices[path[: len(path) - closed]].tolist():
-            groups += [(0, "VERTEX"), (8, DXF_LAYER), *place(vertex), (70, _VERTEX_IN_SPACE)]
-        groups += [(0, "SEQEND"), (8, DXF_LAYER)]
-    for vertex in skeleton.vertices[skeleton.degree == 0].tolist():
-        groups += [(0, "POINT"), (8, DXF_LAYER), *place(vertex)]
-    groups += [(0, "ENDSEC"), (0, "EOF")]
-    return text(f"{code}\n{value}" for code, value in groups)
 
 
 def write_vtp(skeleton: Skeleton) -> bytes:

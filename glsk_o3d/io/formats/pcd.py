@@ -2,20 +2,17 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import BinaryIO
 
 import numpy as np
 
-from ...interop.packages import import_open3d
 from ..paths import check_promised, number_rows, text_lines
-from ..scan import Scan, named_attributes
+from ..scan import Scan, scan_of
 
-_NORMALS = ["normal_x", "normal_y", "normal_z"]
+_NORMALS = {f"normal_{axis}": f"n{axis}" for axis in "xyz"}
 _TYPES = {kind + size for kind, sizes in (("F", "48"), ("I", "1248"), ("U", "1248")) for size in sizes}
 _PLACE = (" x", " y", " z")  # after the number of the field
-MOST_PACKED = 88  # derived: LZF's longest copy, of 264 bytes, takes three
-_PACKED_COLORS = ("rgb", "rgba")
+_PACKED_COLORS, _SHIFTS = ("rgb", "rgba"), {"red": 16, "green": 8, "blue": 0}
 
 
 def blocks(path: Path, rows: int, bare: bool) -> tuple[int | None, Iterator[Scan]]:
@@ -46,8 +43,6 @@ def read_header(stream: BinaryIO) -> tuple[np.dtype, int, str]:
     points, (kept,) = int(header["POINTS"][0]), header["DATA"]
     if points < 0 or min(counts, default=0) < 1:
         raise ValueError("its header has a negative count")
-    if {"WIDTH", "HEIGHT"} <= header.keys() and int(header["WIDTH"][0]) * int(header["HEIGHT"][0]) != points:
-        raise ValueError(f"its header promises {points} points, and another width and height")
     if not all(kind + size in _TYPES for kind, size in zip(kinds, sizes, strict=True)):
         raise ValueError("its header has unknown types")
     fields = zip(names, sizes, kinds, counts, strict=True)
@@ -80,18 +75,13 @@ def _text(lines: Iterator[str], row: np.dtype, n: int) -> np.ndarray:
 
 
 def _compressed(path: Path) -> Scan:
-    """The points of compressed data.
-
-    Open3D crashes on padding, on fields of one name and on a part of the normals, and mixes up types.
-    """
+    """The points of compressed data: Open3D crashes on padding and fields of one name, and mixes up types."""
     with path.open("rb") as stream:
         row, points, _ = read_header(stream)
         packed, size = np.frombuffer(stream.read(8).ljust(8, b"\0"), "<u4").tolist()
-        check_promised(packed, path.stat().st_size - stream.tell(), "compressed bytes")
         data = stream.read(packed)
-    check_promised(size, MOST_PACKED * packed, "bytes")
-    if size != points * row.itemsize:
-        raise ValueError(f"its {points} points have {points * row.itemsize} bytes, and those that are packed {size}")
+    check_promised(packed, len(data), "compressed bytes")
+    check_promised(points * row.itemsize, size, "bytes")
     unpacked, columns, at = _unpacked(data, size), {}, 0
     for name in row.names or ():  # one after the other
         base, n = row[name].base, row[name].shape[0]
@@ -101,38 +91,33 @@ def _compressed(path: Path) -> Scan:
 
 
 def _unpacked(data: bytes, size: int) -> bytes:
-    """What LZF has packed, of so many bytes. Open3D unpacks it as a cloud whose coordinates are eight bytes each."""
-    o3d, missing = import_open3d(), -size % 24
-    data += bytes([missing - 1, *[0] * missing] if missing else [])  # a run of so many bytes as they are
-    n = (size + missing) // 24
-    head = (
-        f"FIELDS x y z\nSIZE 8 8 8\nTYPE U U U\nCOUNT 1 1 1\nWIDTH {n}\nHEIGHT 1\nPOINTS {n}\nDATA binary_compressed\n"
-    )
-    sizes = np.array([len(data), size + missing], "<u4").tobytes()
-    with TemporaryDirectory() as folder, o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-        path = Path(folder, "bytes.pcd")
-        path.write_bytes(head.encode() + sizes + data)
-        cloud = o3d.t.io.read_point_cloud(str(path))
-    unpacked = cloud.point.positions.numpy().T.tobytes() if "positions" in cloud.point else b""
-    check_promised(size, len(unpacked), "bytes")
-    return unpacked[:size]
+    """What LZF has packed, of so many bytes: runs of bytes as they are, and copies of what came before."""
+    out, at = bytearray(), 0
+    while at < len(data) and len(out) < size:
+        control, at = data[at], at + 1
+        if control < 32:
+            out += data[at : at + control + 1]
+            at += control + 1
+            continue
+        length, back = (control >> 5) + 2, (control & 31) << 8
+        if length == 9:
+            length, at = length + data[at], at + 1
+        start, at = len(out) - back - data[at] - 1, at + 1
+        if start < 0:
+            raise ValueError("its compressed data are damaged")
+        copied = out[start : start + length]
+        out += (copied * (length // len(copied) + 1))[:length]  # it may overlap its copy
+    check_promised(size, len(out), "bytes")
+    return bytes(out)
 
 
 def _scan(columns: dict[str, np.ndarray]) -> Scan:
     known = {name.partition(" ")[2]: values[:, 0] for name, values in columns.items() if values.shape[1] == 1}
-    if not set("xyz") <= known.keys():
-        raise ValueError("it has no fields x, y and z")
-    positions = np.column_stack([known.pop(axis) for axis in "xyz"]).astype(float)
-    packed = next((known.pop(name) for name in _PACKED_COLORS if name in known), None)
-    normals = None
-    if set(_NORMALS) <= known.keys():
-        normals = np.column_stack([known.pop(name) for name in _NORMALS]).astype(float)
     known.pop("_", None)  # padding
-    attributes = named_attributes((name, np.ascontiguousarray(values)) for name, values in known.items())
-    return Scan(positions, None if packed is None else _colors(packed), normals, attributes)
-
-
-def _colors(packed: np.ndarray) -> np.ndarray:
-    """Red, green and blue from 0 to 1 of the bits of a number of four bytes."""
-    bits = np.ascontiguousarray(packed, packed.dtype if packed.dtype.itemsize == 4 else np.uint32).view(np.uint32)
-    return np.stack([bits >> 16 & 255, bits >> 8 & 255, bits & 255], axis=1) / 255
+    if _NORMALS.keys() <= known.keys():
+        known |= {name: known.pop(of_pcl) for of_pcl, name in _NORMALS.items()}
+    packed = next((known.pop(name) for name in _PACKED_COLORS if name in known), None)
+    if packed is not None:  # in the bits of a number of four bytes
+        bits = np.ascontiguousarray(packed, packed.dtype if packed.dtype.itemsize == 4 else np.uint32).view(np.uint32)
+        known |= {name: (bits >> shift & 255).astype(np.uint8) for name, shift in _SHIFTS.items()}
+    return scan_of(known, 255)

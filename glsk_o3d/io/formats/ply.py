@@ -9,24 +9,23 @@ import io
 import os
 import struct
 from array import array
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from itertools import islice
+from itertools import islice, repeat, takewhile
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
 from ...skeleton import Skeleton
-from ..paths import check_budget, check_promised, number_rows, text_lines
-from ..scan import COLOR_CHANNELS, NO_TRIANGLES, NORMAL_NAMES, Scan, brightest, named_attributes, unit_colors
+from ..paths import check_promised, number_rows, text_lines
+from ..scan import COLOR_CHANNELS, NO_TRIANGLES, NORMAL_NAMES, Scan, scan_of
 from .graphs import NoEdges, graph_skeleton
 
 SECTION = ("half_width", "half_thickness")
 LONGEST_LINE = 1 << 16  # derived: far beyond any line of a header, so that an endless file without lines ends
 LONGEST_HEADER = 1 << 12  # derived: in lines, likewise
-LIST_BYTES, MOST_IN_LISTS = 32, 16  # derived: taken for a row with a list; fitted: times the size of a file, for all
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _KINDS = {
     **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4"},
@@ -36,9 +35,7 @@ _KINDS = {
 _COUNTS = [name for name, kind in _KINDS.items() if kind[0] != "f"]
 WRITTEN_KINDS = {"u1": "uchar", "i4": "int", "f4": "float", "f8": "double"}
 """The types that Open3D reads: of others it leaves the column out."""
-
-
-# -------------------------------------------------------------------------------------------------------------- header
+_PROPERTIES = {"positions": [*"xyz"], "normals": NORMAL_NAMES, "colors": COLOR_CHANNELS}
 
 
 class Column(NamedTuple):
@@ -61,24 +58,28 @@ class Element(NamedTuple):
         """Whether rows differ in length."""
         return any(column.counts for column in self.columns)
 
-    def dtype(self, order: str) -> np.dtype:
-        """A row of binary data without lists in a byte order."""
-        return np.dtype([(column.name, order + column.kind) for column in self.columns])
+    def dtype(self, order: str, sizes: Mapping[str, int] = {}) -> np.dtype:
+        """A row of binary data in a byte order, if its lists have these sizes: with a column of counts for each."""
+        fields: list[Any] = []
+        for name, kind, counts in self.columns:
+            if counts:
+                fields.append((f"{name} count", order + counts))
+            fields.append((name, order + kind, (sizes[name],)) if counts else (name, order + kind))
+        return np.dtype(fields)
 
     def least(self, order: str) -> int:
-        """The bytes of a row at the least: in text two for a number, of a face those of one corner."""
-        columns = [
-            (each.counts, each.kind) if self.name == "face" else (each.counts or each.kind,) for each in self.columns
-        ]
-        return sum(np.dtype(kind).itemsize if order else 2 for kinds in columns for kind in kinds if kind)
+        """The bytes of a row at the least, in text two for a number: lists may be empty, but a face has a corner."""
+        kinds = [column.counts or column.kind for column in self.columns]
+        kinds += [column.kind for column in self.columns if column.counts and self.name == "face"]
+        return sum(np.dtype(kind).itemsize if order else 2 for kind in kinds)
 
     def check(self, held: int) -> None:
         """Raise ValueError where there are less rows."""
         check_promised(self.rows, held, "points" if self.name == "vertex" else f"rows of {self.name!r}")
 
 
-def check_elements(elements: list[Element], order: str, size: int) -> int:
-    """What elements take of so many bytes at the least; ValueError where that is more, or names repeat."""
+def check_elements(elements: list[Element], order: str, size: int) -> None:
+    """Raise ValueError where elements take more than so many bytes, or names repeat."""
     at = 0
     for element in elements:
         if len({column.name for column in element.columns}) < max(len(element.columns), element.rows > 0):
@@ -86,7 +87,6 @@ def check_elements(elements: list[Element], order: str, size: int) -> int:
         least = element.least(order)
         element.check((size - at) // max(least, 1))
         at += element.rows * least
-    return at
 
 
 def read_header(stream: BinaryIO) -> tuple[str, list[Element]]:
@@ -122,30 +122,28 @@ def holds_lines(stream: BinaryIO) -> bool:
     return False
 
 
-# -------------------------------------------------------------------------------------------------------------- tables
-
-
 class Lists(NamedTuple):
-    """A column of lists: how many values each row has, and where the first is; the next is a `step` behind it."""
+    """A column of lists: how many values each row has, and all values, those of a row after those before it."""
 
     counts: np.ndarray
-    first: np.ndarray
     values: np.ndarray
-    step: int
 
 
 Table = Mapping[str, Any]  # of arrays and lists
+Take = Callable[[str, int], Sequence[float]]
+"""Gives the next so many values of a type in a row."""
 
 
 def read_tables(stream: BinaryIO, *wanted: str) -> dict[str, Table]:
-    """Elements that a file has, columns by name; text becomes float64. The others are read over: nothing may lack."""
+    """Elements that a file has, columns by name; in text floats become float64. The others are read over: nothing may
+    lack.
+    """
     order, elements = read_header(stream)
     start = stream.tell()
     end = stream.seek(0, os.SEEK_END)
     check_elements(elements, order, end - start + (not order))  # the last line of text may have no end
     stream.seek(start)
-    elements = [element for element in elements if element.columns]
-    tables = dict[str, Table]()
+    elements, tables = [element for element in elements if element.columns], dict[str, Table]()
     if order:
         data, at = stream.read(), 0
         for element in elements:
@@ -163,85 +161,64 @@ def read_tables(stream: BinaryIO, *wanted: str) -> dict[str, Table]:
 
 def text_table(lines: Iterator[str], element: Element) -> Table:
     """The next rows of text as a table."""
-    if not element.has_lists:
-        rows = number_rows(lines, element.rows, len(element.columns))
-        element.check(len(rows))
-        return dict(zip([column.name for column in element.columns], rows.T, strict=True))
-    words, ends = array("d"), array("q", [0])
-    for line in islice(lines, element.rows):
-        words.extend(map(float, line.split()))
-        ends.append(len(words))
-    element.check(len(ends) - 1)
-    held = np.frombuffer(words, float)
-    return _columns(element, np.frombuffer(ends, np.int64), lambda kind: (held, 1))[0]
+    if element.has_lists:
+        return _row_by_row(element, map(_words, islice(lines, element.rows)))
+    rows = number_rows(lines, element.rows, len(element.columns))
+    element.check(len(rows))
+    return {name: _typed(values, kind) for (name, kind, _), values in zip(element.columns, rows.T, strict=True)}
 
 
-def _binary(data: bytes, at: int, element: Element, order: str) -> tuple[Table, int]:
-    """A table and where it ends; at once if its rows are all as long as the first."""
-    if not element.has_lists:
-        row = element.dtype(order)
-        end = at + element.rows * row.itemsize
-        element.check((len(data) - at) // row.itemsize)
-        rows = np.frombuffer(data[at:end], row)
-        return {name: rows[name] for name in row.names or ()}, end
-    check_budget(LIST_BYTES * element.rows, len(data), MOST_IN_LISTS)
-    sizes = [
-        (np.dtype(kind).itemsize, struct.Struct(order + np.dtype(counts).char) if counts else None)
-        for _, kind, counts in element.columns
-    ]
-
-    def end_of(place: int) -> int:
-        for size, count in sizes:
-            n = 1
-            if count is not None:
-                (n,) = count.unpack_from(data, place)
-                place += count.size
-            place += size * max(n, 0)  # that none is negative is asked of the columns
-        return place
-
-    def values(kind: str) -> tuple[np.ndarray, int]:
-        size = np.dtype(kind).itemsize
-        return np.ndarray(max(len(data) - size + 1, 0), order + kind, data, strides=(1,)), size  # one at every byte
-
-    starts = array("q", [at])
-    with suppress(struct.error):  # there is no more count
-        alike = at + (end_of(at) - at) * np.arange(element.rows + 1)
-        with suppress(ValueError, IndexError):
-            table, ends = _columns(element, alike, values)
-            if (ends == alike[1:]).all() and alike[-1] <= len(data):
-                return table, int(alike[-1])
-        while len(starts) <= element.rows and (after := end_of(starts[-1])) <= len(data):
-            starts.append(after)
-    element.check(len(starts) - 1)
-    return _columns(element, np.frombuffer(starts, np.int64), values)[0], starts[-1]
+@np.errstate(invalid="ignore")
+def _typed(values: np.ndarray, kind: str) -> np.ndarray:
+    """Numbers of text in the type of their column, but with all their digits."""
+    return values if kind[0] == "f" else values.astype(kind)
 
 
-def _columns(
-    element: Element, starts: np.ndarray, values: Callable[[str], tuple[np.ndarray, int]]
-) -> tuple[Table, np.ndarray]:
-    """Columns of rows that begin where they do, and where the rows end, among the values of a type, a step apart."""
-    table: dict[str, Any] = {}
-    place, ends = starts[:-1], starts[1:]
+def _words(line: str) -> Take:
+    words = iter(line.split())
+    return lambda kind, n: [float(word) for word in islice(words, n)]
 
-    def passed(size: int | np.ndarray) -> np.ndarray:
-        nonlocal place
-        before, place = place, place + size
-        if (short := place > ends).any():
-            element.check(int(short.argmax()))
-        return before
 
-    for name, kind, counts in element.columns:
-        held, size = values(counts or kind)
-        column = held[passed(size)]
-        if counts:
-            if not ((column >= 0) & (column <= len(held)) & (column % 1 == 0)).all():
-                raise ValueError(f"a list of {element.name!r} has an impossible number of values")
-            held, size = values(kind)
-            n = column.astype(np.int64)
-            table[name] = Lists(n, passed(n * size), held, size)
-        else:
-            table[name] = column
-    return table, place
+def _binary(data: bytes, start: int, element: Element, order: str) -> tuple[Table, int]:
+    """A table and where it ends; at once if its lists are all as long as in the first row."""
+    at = start
+
+    def take(kind: str, n: int) -> Sequence[float]:
+        nonlocal at
+        before, at = at, at + n * np.dtype(kind).itemsize
+        check_promised(at, len(data), "bytes")
+        return struct.unpack_from(f"{order}{n}{np.dtype(kind).char}", data, before)
+
+    lists = [column.name for column in element.columns if column.counts]
+    first = _row_by_row(element._replace(rows=1), [take]) if lists and element.rows else {}
+    sizes = {name: len(first[name].values) if first else 0 for name in lists}
+    row = element.dtype(order, sizes)
+    end = start + element.rows * row.itemsize
+    if end <= len(data):
+        rows = np.frombuffer(data[start:end], row)
+        if all((rows[f"{name} count"] == size).all() for name, size in sizes.items()):
+            counted = {name: Lists(rows[f"{name} count"], rows[name].ravel()) for name in sizes}
+            return {column.name: rows[column.name] for column in element.columns} | counted, end
+    element.check(element.rows if sizes else (len(data) - start) // row.itemsize)
+    at = start
+    return _row_by_row(element, repeat(take, element.rows)), at
+
+
+def _row_by_row(element: Element, rows: Iterable[Take]) -> Table:
+    """A table whose rows differ in length."""
+    found = [(array("q"), array("d")) for _ in element.columns]
+    for take in rows:
+        for (_, kind, counted), (counts, values) in zip(element.columns, found, strict=True):
+            n = int(take(counted, 1)[0]) if counted else 1
+            held = take(kind, n)
+            check_promised(n, len(held), f"numbers in a row of {element.name!r}")
+            counts.append(n)
+            values.extend(held)
+    element.check(len(found[0][0]))
+    return {
+        name: Lists(np.array(counts), np.array(values)) if counted else _typed(np.array(values), kind)
+        for (name, kind, counted), (counts, values) in zip(element.columns, found, strict=True)
+    }
 
 
 # ----------------------------------------------------------------------------------------------------------- skeletons
@@ -278,16 +255,14 @@ def blocks(path: Path, rows: int, bare: bool) -> tuple[int | None, Iterator[Scan
     with path.open("rb") as stream:
         order, elements = read_header(stream)
         start = stream.tell()
-    held = [element for element in elements if element.rows]
-    names = [element.name for element in held]
-    if not order or "vertex" not in names or any(element.has_lists for element in held):
+    held = {element.name: element for element in elements if element.rows}
+    if not order or "vertex" not in held or any(element.has_lists for element in held.values()):
         return None, map(_whole, [path])
-    size = path.stat().st_size - start
-    if size > check_elements(held, order, size) and len(held) > 1:
-        raise ValueError("it holds more than its header promises")
-    at = names.index("vertex")
-    start += sum(element.rows * element.dtype(order).itemsize for element in held[:at])
-    return held[at].rows, _blocks(path, start, held[at].dtype(order), held[at].rows, rows, bare)
+    check_elements(elements, order, path.stat().st_size - start)
+    for element in takewhile(lambda element: element.name != "vertex", elements):
+        start += element.rows * element.least(order)
+    vertex = held["vertex"]
+    return vertex.rows, _blocks(path, start, vertex.dtype(order), vertex.rows, rows, bare)
 
 
 def _whole(path: Path) -> Scan:
@@ -296,48 +271,22 @@ def _whole(path: Path) -> Scan:
     if "vertex" not in tables:
         raise ValueError("it has no element 'vertex'")
     scan = _scan(tables["vertex"])
-    return replace(scan, triangles=triangles(tables.get("face", {}), len(scan)), types={})
+    return replace(scan, triangles=triangles(tables.get("face", {}), len(scan)))
 
 
 def _blocks(path: Path, start: int, row: np.dtype, n: int, rows: int, bare: bool) -> Iterator[Scan]:
-    def tables() -> Iterator[np.ndarray]:
-        with path.open("rb") as stream:
-            stream.seek(start)
-            for begin in range(0, n, rows):
-                yield np.frombuffer(stream.read(min(rows, n - begin) * row.itemsize), row)
-
-    names, top = row.names or (), None
-    colored = {*COLOR_CHANNELS} <= {*names} and any(row[name] != np.uint8 for name in COLOR_CHANNELS)
-    if rows < n and colored and not bare:  # the scale of the colours depends on the brightest of all
-        top = max(brightest(table[name]) for table in tables() for name in COLOR_CHANNELS)
-    for table in tables():
-        yield _scan({name: table[name] for name in names if not bare or name in "xyz"}, top)
+    with path.open("rb") as stream:
+        stream.seek(start)
+        for begin in range(0, n, rows):
+            table = np.frombuffer(stream.read(min(rows, n - begin) * row.itemsize), row)
+            yield _scan({name: table[name] for name in row.names or () if not bare or name in "xyz"})
 
 
-def _scan(table: Table, top: float | None = None) -> Scan:
-    """Points of a table of vertices; `top` is the largest number among the colours of all, if these are not all."""
-    known = {name: values for name, values in table.items() if isinstance(values, np.ndarray)}
-    if not set("xyz") <= known.keys():
-        raise ValueError("its vertices have no x, y and z")
-    types: dict[str, np.dtype] = {}
-
-    def together(names: list[str]) -> np.ndarray | None:
-        if not set(names) <= known.keys():
-            return None
-        types.update((name, known[name].dtype.newbyteorder("=")) for name in names)
-        return np.column_stack([known.pop(name) for name in names])
-
-    positions, colors, normals = (together(names) for names in ([*"xyz"], COLOR_CHANNELS, NORMAL_NAMES))
-    attributes = named_attributes(
-        (name, values.astype(values.dtype.newbyteorder("="))) for name, values in known.items()
-    )
-    return Scan(
-        np.ascontiguousarray(positions, float),
-        None if colors is None else unit_colors(colors, top),
-        None if normals is None else np.ascontiguousarray(normals, float),
-        attributes,
-        types=types | {name: values.dtype for name, values in attributes.items()},
-    )
+def _scan(table: Table) -> Scan:
+    """Points of a table of vertices; integers of 16 bits are colours up to 65535, others up to 255, floats up to 1."""
+    columns = {name: values for name, values in table.items() if isinstance(values, np.ndarray)}
+    kind = columns["red"].dtype.str[1:] if "red" in columns else ""
+    return scan_of(columns, 1 if kind[:1] == "f" else 65535 if kind == "u2" else 255)
 
 
 def triangles(faces: Table, n: int) -> np.ndarray:
@@ -345,16 +294,41 @@ def triangles(faces: Table, n: int) -> np.ndarray:
     corners = faces.get("vertex_indices", faces.get("vertex_index"))
     if not isinstance(corners, Lists) or len(corners.counts) == 0:
         return NO_TRIANGLES
-    fans = np.maximum(corners.counts - 2, 0)
-    first = np.repeat(corners.first, fans)
-    step = np.arange(len(first)) - np.repeat(np.cumsum(fans) - fans, fans)
-    found = np.column_stack([corners.values[first + corners.step * each] for each in (0, step + 1, step + 2)])
-    if corners.counts.min() < 1 or not ((found >= 0) & (found < n)).all():
+    counts = corners.counts.astype(np.int64)
+    if counts.min() < 1 or not ((corners.values >= 0) & (corners.values < n)).all():
         raise ValueError("a face has no corners, or one that is no vertex")
-    return found.astype(np.int64)
+    fans = np.maximum(counts - 2, 0)
+    first = np.repeat(np.cumsum(counts) - counts, fans)
+    step = np.arange(len(first)) - np.repeat(np.cumsum(fans) - fans, fans)
+    return np.column_stack([corners.values[first + each] for each in (0, step + 1, step + 2)]).astype(np.int64)
 
 
 # ------------------------------------------------------------------------------------------------------------- writing
+
+
+def content(columns: Mapping[str, np.ndarray], triangles: np.ndarray | None = None) -> bytes:
+    """A file of vertices, columns by name, and of triangles, (T, 3) int array."""
+    vertices = rows_of(columns)
+    if triangles is None:
+        return header_of(vertices.dtype, len(vertices)) + vertices.tobytes()
+    faces = np.empty(len(triangles), [("n", "u1"), ("corners", "<i4", 3)])
+    faces["n"], faces["corners"] = 3, triangles
+    more = f"element face {len(faces)}\nproperty list uchar int vertex_indices\n"
+    return header_of(vertices.dtype, len(vertices), more=more) + vertices.tobytes() + faces.tobytes()
+
+
+def columns_of(held: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Columns of the types that Open3D reads, of arrays, (n,) or (n, k), by the names that its clouds have."""
+    columns: dict[str, np.ndarray] = {}
+    for name, values in held.items():
+        if name == "colors" and values.dtype.kind == "f":
+            values = np.round(255 * np.clip(values, 0, 1)).astype(np.uint8)
+        elif values.dtype.str[1:] not in WRITTEN_KINDS:
+            values = values.astype(np.int32 if np.can_cast(values.dtype, np.int32) else float)
+        values = values.reshape(len(values), -1)
+        names = [f"{name}_{i}" for i in range(values.shape[1])] if values.shape[1] > 1 else [name]
+        columns |= dict(zip(_PROPERTIES.get(name, names), values.T, strict=True))
+    return columns
 
 
 def rows_of(columns: Mapping[str, np.ndarray]) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""OBJ, GraphML, CGAL's text, DXF in ezdxf, VTP in VTK: as others write them, and as others read ours."""
+"""OBJ, GraphML, CGAL's text, VTP in VTK: as others write them, and as others read ours."""
 
 import networkx
 import numpy as np
@@ -49,28 +49,9 @@ def test_graphml_of_others_and_in_networkx(tree, tmp_path):
 
 
 def test_polylines_have_a_line_per_branch(tree, forest, tmp_path):
-    for skeleton, name, counts in ((tree, "s.cgal", [2, 3, 3]), (forest, "s.polylines.txt", [1, 2, 3])):
-        save_skeleton(skeleton, tmp_path / name)
-        assert sorted(int(line.split()[0]) for line in (tmp_path / name).read_text().splitlines()) == counts
-
-
-def test_ezdxf_reads_a_polyline_per_branch(skeleton, tmp_path):
-    ezdxf = pytest.importorskip("ezdxf")
-    save_skeleton(skeleton, tmp_path / "s.dxf")
-    drawing = ezdxf.readfile(tmp_path / "s.dxf")
-    assert not drawing.audit().errors
-    assert drawing.dxfversion == "AC1009"
-    lines = [entity for entity in drawing.modelspace() if entity.dxftype() == "POLYLINE"]
-    points = [entity for entity in drawing.modelspace() if entity.dxftype() == "POINT"]
-    assert len(lines) == len(skeleton.branches)
-    for line, path in zip(lines, skeleton.branches, strict=True):
-        assert line.is_3d_polyline
-        curve = skeleton.vertices[path]
-        closed = len(path) > 2 and path[0] == path[-1]
-        assert line.is_closed == closed
-        np.testing.assert_array_equal([tuple(place) for place in line.points()], curve[: len(curve) - closed])
-    alone = skeleton.vertices[skeleton.degree == 0]
-    np.testing.assert_array_equal(np.reshape([tuple(point.dxf.location) for point in points], (-1, 3)), alone)
+    for skeleton, counts in ((tree, [2, 3, 3]), (forest, [1, 2, 3])):
+        save_skeleton(skeleton, tmp_path / "s.cgal")
+        assert sorted(int(line.split()[0]) for line in (tmp_path / "s.cgal").read_text().splitlines()) == counts
 
 
 def test_vtk_reads_vertices_branches_and_radii(skeleton, tmp_path):

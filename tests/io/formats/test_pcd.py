@@ -46,13 +46,12 @@ def test_padding_and_fields_of_many_values(tmp_path, kept):
 @pytest.mark.parametrize(
     ("fields", "attributes"),
     [
-        ("x y z normal_x", ["normal_x"]),
         ("x y z normal_x normal_z", ["normal_x", "normal_z"]),
         ("x y z intensity intensity", ["intensity"]),
-        ("x y z colors positions", ["colors_2", "positions_2"]),
+        ("x y z colors colors_2", ["colors_2", "colors_2_2"]),
     ],
 )
-def test_compressed_fields_that_open3d_would_crash_on(tmp_path, fields, attributes):
+def test_fields_of_odd_names(tmp_path, fields, attributes):
     n = len(fields.split())
     values = np.arange(2 * n, dtype="<f4").reshape(n, 2)
     head = f"FIELDS {fields}\nSIZE{' 4' * n}\nTYPE{' F' * n}\nPOINTS 2\nDATA binary_compressed\n"
@@ -73,7 +72,7 @@ def test_compressed_fields_that_open3d_would_crash_on(tmp_path, fields, attribut
         ("POINTS 2", "POINTS -5", "negative count"),
         ("POINTS 2", "POINTS 99999999999", "promises 99999999999"),
         ("DATA", "DATUM", "no DATA"),
-        ("FIELDS x y", "FIELDS x w", "no fields x, y and z"),
+        ("FIELDS x y", "FIELDS x w", "it has no x, y and z"),
         ("POINTS 2", "POINTS 3", "promises 3 points and holds 2"),
         ("COUNT 1 1 1 1", "COUNT 1 1 1", "c.pcd"),
     ],
@@ -82,20 +81,6 @@ def test_headers_that_make_no_sense(tmp_path, old, new, says):
     (tmp_path / "c.pcd").write_bytes(f"{HEAD}DATA binary\n".replace(old, new).encode() + b"\0" * 2 * 33)
     with pytest.raises(FileFormatError, match=says):
         read_scan(tmp_path / "c.pcd")
-
-
-@pytest.mark.parametrize("damage", ["cut", "zeros"])
-def test_packed_data_that_make_no_sense(cloud, tmp_path, capfd, damage):
-    import open3d as o3d
-
-    path = tmp_path / "c.pcd"
-    o3d.io.write_point_cloud(str(path), cloud, compressed=True)
-    whole = path.read_bytes()
-    start = whole.index(b"compressed\n") + 19
-    path.write_bytes(whole[:-9] if damage == "cut" else whole[:start] + b"\0" * (len(whole) - start))
-    with pytest.raises(FileFormatError, match=r"promises 1\d+ (compressed )?bytes"):
-        read_scan(path)
-    assert capfd.readouterr() == ("", "")
 
 
 @given(

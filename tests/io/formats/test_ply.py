@@ -1,17 +1,13 @@
 """PLY: skeletons in other programs, and tables of all kinds: those that are right are read, others are refused."""
 
-import io
 import struct
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from glsk_o3d import save_skeleton
 from glsk_o3d.errors import FileFormatError
-from glsk_o3d.io.formats.ply import read_tables
 from glsk_o3d.io.scans import read_scan
 from glsk_o3d.io.skeletons import read_skeleton
 
@@ -137,26 +133,6 @@ def test_properties_of_all_kinds(scan, format):
     assert all(values.dtype.isnative for values in found.attributes.values())
 
 
-@settings(max_examples=80, deadline=None)
-@given(
-    rows=st.lists(
-        st.tuples(st.lists(st.integers(0, 9), max_size=4), st.integers(-9, 9)),
-        min_size=1,
-        max_size=6,
-    ),
-    format=st.sampled_from(list(FORMATS)),
-)
-def test_lists_of_all_lengths_wherever_they_stand(rows, format):
-    elements = ("odd", ["list uchar ushort some", "int more"], rows), ("vertex", XYZ, SQUARE)
-    tables = read_tables(io.BytesIO(ply(format, *elements)), "vertex", "odd")
-    some = tables["odd"]["some"]
-    np.testing.assert_array_equal(some.counts, [len(values) for values, _ in rows])
-    found = [some.values[first + some.step * np.arange(n)] for first, n in zip(some.first, some.counts, strict=True)]
-    assert [values.tolist() for values in found] == [values for values, _ in rows]
-    np.testing.assert_array_equal(tables["odd"]["more"], [more for _, more in rows])
-    np.testing.assert_array_equal(np.column_stack([tables["vertex"][axis] for axis in "xyz"]), SQUARE)
-
-
 @pytest.mark.parametrize("lists", [[(), (), (), ()], [(1, 2), (3, 4), (5, 6), (7, 8)], [(1,), (), (2, 3), (4, 5, 6)]])
 @all_formats
 def test_a_file_that_ends_anywhere_before_its_tables_do_is_refused(scan, format, lists):
@@ -167,6 +143,7 @@ def test_a_file_that_ends_anywhere_before_its_tables_do_is_refused(scan, format,
         [("vertex", XYZ, SQUARE), ("face", FACE, faces)],
     ):
         whole = ply(format, *elements).rstrip(b"\n")
+        np.testing.assert_array_equal(scan(whole + b"\n" * (format == "ascii")).positions, SQUARE)
         head, last = whole.index(b"end_header\n"), whole.rindex(b"\n") if format == "ascii" else len(whole) - 1
         for cut in (*range(0, head, 97), *range(head, last, 5), last):
             with pytest.raises(FileFormatError, match=r"m\.ply"):

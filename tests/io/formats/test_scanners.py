@@ -44,7 +44,7 @@ def e57(tmp_path):
     return write
 
 
-@pytest.mark.parametrize("name", ["c.las", "c.laz", "C.LAZ"])
+@pytest.mark.parametrize("name", ["c.las", "C.LAZ"])
 @pytest.mark.parametrize(("version", "point_format"), [("1.2", 3), ("1.3", 1), ("1.4", 6), ("1.4", 7)])
 def test_coordinates_keep_their_digits_and_attributes_survive(las, name, version, point_format):
     held = {"intensity": [7, 65535, 0], "classification": [2, 5, 5], "treeID": [0, 4, 9]}
@@ -81,14 +81,14 @@ def test_e57_scans_stand_where_their_poses_put_them(e57):
     assert scan.attributes["scan"].tolist() == [0, 0, 0, 1, 1, 1]
 
 
-def test_e57_has_colours_if_all_scans_do_and_intensity_if_one_does(e57):
+def test_e57_has_what_all_scans_have(e57):
     grey, intensity = np.array([0, 51, 255]), np.array([0.0, 0.25, 1.0])
     colors = dict.fromkeys(("colorRed", "colorGreen", "colorBlue"), grey)
     scan = read_scan(e57((np.eye(3), colors | {"intensity": intensity})))
     np.testing.assert_allclose(scan.colors, np.tile(grey[:, None] / 255, 3))
     np.testing.assert_allclose(scan.attributes["intensity"], intensity)
     scan = read_scan(e57((np.eye(3), {}), (np.eye(3), {"intensity": intensity})))
-    np.testing.assert_allclose(scan.attributes["intensity"], [np.nan] * 3 + intensity.tolist())
+    assert list(scan.attributes) == ["scan"]
 
 
 # ------------------------------------------------------------------------------------------------------------- damaged
@@ -108,61 +108,31 @@ def test_damaged_and_empty_files(las, e57, name):
         read_cloud(path)
 
 
+# ---------------------------------------------------------------------------------------------------------------- sound
+
+
 def overwrite(path, at, number, length=4):
     data = bytearray(path.read_bytes())
     data[at : at + length] = number.to_bytes(length, "little")
     path.write_bytes(data)
 
 
-def chunks(path):
-    """Where the chunks begin, and their table."""
-    data = path.read_bytes()
-    start = int.from_bytes(data[96:100], "little")
-    return start, int.from_bytes(data[start : start + 8], "little")
-
-
-TABLE = r"chunks, or one of them, promises more than its \d+ bytes can hold"
-
-
 @pytest.mark.parametrize(
-    ("place", "number", "length", "says"),
-    [
-        *(("chunks", count, 4, TABLE) for count in (0, 1000, 2**24, 2**31, 2**32 - 1)),
-        *(("table", at, 8, TABLE) for at in (0, 1, 2**40, 2**63)),
-        *((f"layer {layer}", 2**32 - 1, 4, TABLE) for layer in (0, 5, 9)),
-        ("item", 65535, 2, r"its points have \d+ bytes, and those that are packed \d{5}"),
-        ("points", 10**7, 8, "at most 67108864 are allowed, 200 times"),
-    ],
+    ("place", "number", "length"),
+    [("records", 2**31, 4), ("chunks", 0, 4), ("chunks", 2**31, 4), ("table", 2**40, 8), ("layer", 2**31, 4)],
 )
-def test_what_no_packed_file_holds_is_refused_before_memory_is_taken(las, place, number, length, says):
-    """For some of it lazrs would end the process, even in another; with fewer chunks it would read what is behind."""
+def test_what_no_packed_file_holds_is_refused(las, place, number, length):
+    """For some of it lazrs would end the process, for some laspy would not come back."""
     path = las("c.laz")
-    start, table = chunks(path)
-    item = path.read_bytes().index(b"laszip encoded") - 2 + 54 + 34 + 2
-    at = {"chunks": table + 4, "table": start, "item": item, "points": 247}
-    overwrite(path, at[place] if place in at else start + 8 + 40 + 4 + 4 * int(place.split()[1]), number, length)
-    with pytest.raises(FileFormatError, match=says):
-        read_scan(path)
-
-
-def test_points_packed_as_nothing_are_refused(las):
-    """lazrs panics, which Python's own exceptions do not cover."""
-    path = las("c.laz")
-    overwrite(path, path.read_bytes().index(b"laszip encoded") - 2 + 54 + 32, 0, 2)
-    overwrite(path, 105, 0, 2)
-    with pytest.raises(FileFormatError, match=r"c\.laz: not a valid \.laz file"):
-        read_scan(path)
-
-
-# --------------------------------------------------------------------------------------------------------------- sound
-
-
-def test_a_table_that_was_written_last_is_found_at_the_end(las):
-    path = las("c.laz", classification=[2, 5, 5])
-    start, table = chunks(path)
+    start = int.from_bytes(path.read_bytes()[96:100], "little")
+    table = int.from_bytes(path.read_bytes()[start : start + 8], "little")
+    size = path.stat().st_size
+    path.write_bytes(path.read_bytes() + table.to_bytes(8, "little"))  # where one that was written last is
     overwrite(path, start, 2**64 - 1, 8)
-    path.write_bytes(path.read_bytes() + table.to_bytes(8, "little"))
-    np.testing.assert_allclose(read_scan(path).positions, PLACES, rtol=0, atol=1e-9)
+    assert len(read_scan(path)) == 3
+    overwrite(path, {"records": 100, "chunks": table + 4, "table": size, "layer": start + 52}[place], number, length)
+    with pytest.raises(FileFormatError, match="promise"):
+        read_scan(path)
 
 
 @pytest.mark.parametrize("point_format", [0, 6])
@@ -174,13 +144,10 @@ def test_a_flat_grid_is_packed_well_and_read(tmp_path, point_format):
 
 
 @pytest.mark.parametrize("point_format", [0, 1, 3, 6, 7, 8, 9, 10])
-@pytest.mark.parametrize("n", [1, 49_999, 110_000])
+@pytest.mark.parametrize("n", [1, 110_000])
 def test_sound_packed_files_are_read_whatever_their_points_hold(tmp_path, point_format, n):
     places, extra = np.random.default_rng(0).normal(size=(n, 3)), [("treeID", "uint32"), ("three", "3u1")]
     path = write(tmp_path / "s.laz", places, point_format=point_format, step=1e-6, extra=extra, treeID=np.arange(n))
     found = read_scan(path)
     np.testing.assert_allclose(found.positions, places, rtol=0, atol=1e-6)
     np.testing.assert_array_equal(found.attributes["treeID"], np.arange(n))
-    overwrite(path, chunks(path)[1] + 4, (n - 1) // 50_000)  # one chunk less than hold the points
-    with pytest.raises(FileFormatError, match="table of chunks"):
-        read_scan(path)

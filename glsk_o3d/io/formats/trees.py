@@ -1,7 +1,7 @@
-"""URDF: a tree as a robot model of capsules; keeps vertices, edges and radii, loses all else, and is not read back.
+"""SWC and URDF: places, radii and edges of trees numbered from the root; no cloud.
 
-Planning scenes, RViz and simulators open it. URDF knows no capsule: a link is a cylinder along an edge, and a ball at
-the vertex that it leads to. Lengths are taken as metres, as URDF has them.
+Tools for neurons and plants open SWC. URDF is a robot model, for planning scenes and simulators: a link is a cylinder
+along an edge, and a ball at the vertex that it leads to. Lengths are taken as metres, as URDF has them.
 """
 
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
@@ -11,20 +11,42 @@ import numpy as np
 from ...errors import FileFormatError
 from ...numerics.vectors import norm
 from ...skeleton import Skeleton
-from .graphs import line, parents
+from .graphs import graph_skeleton, line, parents, text, words_by_line
 
 URDF_DENSITY = 1000.0  # published: of water, in kg/m³; fresh wood and most plants are near it
 
 
-def write(skeleton: Skeleton) -> bytes:
+def write_swc(forest: Skeleton) -> bytes:
+    """The content of an SWC file of a skeleton that is numbered from its roots outwards."""
+    parent = parents(forest)
+    number = np.where(parent >= 0, parent + 1, -1).tolist()
+    table = np.column_stack([forest.vertices, forest.radii]).tolist()
+    rows = [line(i, 0, *row, before) for i, (row, before) in enumerate(zip(table, number, strict=True), 1)]
+    return text(["# curve skeleton written by glsk-o3d: id type x y z radius parent", *rows])
+
+
+def read_swc(data: bytes) -> Skeleton:
+    """The skeleton in the content of an SWC file."""
+    rows = words_by_line(data)
+    if any(len(row) < 7 for row in rows) or not rows:
+        raise ValueError("it has no rows of 7 numbers (id type x y z radius parent)")
+    table = np.array([row[:7] for row in rows], float)
+    names, parent = table[:, 0], table[:, 6]
+    order = np.argsort(names)
+    child = np.flatnonzero(parent >= 0)
+    place = np.searchsorted(names[order], parent[child]).clip(max=len(names) - 1)
+    if (names[order][place] != parent[child]).any() or len(np.unique(names)) < len(names):
+        raise ValueError("a parent is missing, or two rows have the same id")
+    return graph_skeleton(table[:, 2:5], np.column_stack([child, order[place]]), table[:, 5])
+
+
+def write_urdf(skeleton: Skeleton) -> bytes:
     """The content of a URDF file of a forest that is numbered outwards; FileFormatError where it has no radii.
 
     Vertex i has ``link_i``, on the fixed joint ``joint_i``; the links of roots stand on the link ``base``, at the
-    origin of the cloud. A link's frame is where it can bend: at the vertex that it comes from, of a root at the vertex
-    itself. Frames are not turned, and each is placed relative to the one before, so that a large offset of the whole
-    cloud is in the joints of the roots alone. Both visual and collision are the ball of the vertex and the cylinder
-    that leads to it, as thick as its ends on average; what has no size is left out. Masses are those of solid cylinders
-    of `URDF_DENSITY`, of a root that of its ball.
+    origin of the cloud. A link's frame is at the vertex that it comes from, not turned, and relative to the one before:
+    a large offset of the whole cloud is in the joints of the roots alone. Cylinders are as thick as their ends on
+    average; what has no size is left out. Masses are those of solid cylinders of `URDF_DENSITY`, of a root of its ball.
     """
     vertices, radii = skeleton.vertices, skeleton.radii
     unknown = np.count_nonzero(~np.isfinite(radii))

@@ -1,4 +1,4 @@
-"""Trees as robot models, read by yourdfpy: where its forward kinematics puts links, and what they are made of."""
+"""SWC as others write it; and robot models in yourdfpy: where it puts links, and what they are made of."""
 
 import io
 import math
@@ -9,15 +9,41 @@ import pytest
 import trimesh
 import yourdfpy
 
-from glsk_o3d import FileFormatError, Skeleton, pipelines, samples
+from glsk_o3d import FileFormatError, Skeleton, pipelines, read_skeleton, samples, save_skeleton
 from glsk_o3d.editing import reroot, simplify
-from glsk_o3d.io.formats import urdf
+from glsk_o3d.io.formats.trees import write_urdf
 
 WATER = 1000.0
 
 
+# ------------------------------------------------------------------------------------------------------------------ SWC
+
+
+def test_swc_as_others_write_it(tmp_path):
+    path = tmp_path / "s.swc"
+    path.write_bytes("# Bäume\n\n 30 3 1 1 1 0.5 7\n7 1 0 0 0 2 -1\n9 3 2 0 0 .5 30 extra\n".encode("latin-1"))
+    back = read_skeleton(path)
+    np.testing.assert_array_equal(back.edges, [[0, 1], [0, 2]])
+    np.testing.assert_array_equal(back.radii, [0.5, 2, 0.5])
+
+
+def test_swc_cuts_the_longest_edges_and_keeps_those_of_no_length(loop, make, tmp_path):
+    save_skeleton(loop, tmp_path / "s.swc", cut_loops=True)
+    tree = read_skeleton(tmp_path / "s.swc")
+    assert (len(tree.edges), tree.n_loops, tree.n_components) == (len(loop.edges) - loop.n_loops, 0, 1)
+    # Of two loops sharing the chord both the chord and one more edge go: the chord is the longest.
+    lengths = np.sort(loop.edge_lengths)
+    assert tree.length == pytest.approx(lengths[:5].sum())
+    assert tree.edge_lengths.max() < lengths[-1]
+    save_skeleton(make(np.zeros((3, 3)), [[0, 1], [1, 2]]), tmp_path / "s.swc")
+    assert len(read_skeleton(tmp_path / "s.swc").edges) == 2
+
+
+# ----------------------------------------------------------------------------------------------------------------- URDF
+
+
 def load(skeleton):
-    robot = yourdfpy.URDF.load(io.BytesIO(urdf.write(skeleton)), load_meshes=False)
+    robot = yourdfpy.URDF.load(io.BytesIO(write_urdf(skeleton)), load_meshes=False)
     assert robot.validate()
     assert robot.base_link == "base"
     return robot
@@ -124,4 +150,4 @@ def test_what_has_no_size_is_left_out(make, dot):
 
 def test_missing_values_are_refused(tree):
     with pytest.raises(FileFormatError, match="needs radii, and 2 of 6 vertices have none"):
-        urdf.write(replace(tree, radii=[1, np.nan, 1, np.nan, 1, 1]))
+        write_urdf(replace(tree, radii=[1, np.nan, 1, np.nan, 1, 1]))
