@@ -70,7 +70,7 @@ QUESTIONS = {
         "gap bridged",
         "bridge",
         True,
-        {"constant": -3.7, "winding": 5.8, "straightness": 2.5, "cap": -0.7},
+        {"constant": -1.7, "winding": 3.7, "cap": -1.2},
     ),
 }
 """What is asked about loops, about branches that leave a junction, about branches, and about ends, in this order."""

@@ -18,8 +18,7 @@ from .evidence import LEAST_INSIDE, Evidence
 BRIDGE_REACH = 6.0  # longest gap, in radii of the end
 BRIDGE_COSINE = 0.5  # least cosine between the bridge and the end
 BRIDGE_LOOK_BACK = 3.0  # radii to look back along a branch for its direction
-DETOUR = 2.0  # least way along the skeleton over that across the gap; less would make a loop of nothing
-DETOUR_RADII = 3.0  # and that many radii more
+DETOUR = 3.0  # least way along the skeleton over that across the gap; less would make a loop of nothing
 BRIDGE_SAMPLES = np.arange(1, 8)[:, None] / 8  # derived: places along a bridge, evenly
 CAP_BACK, CAP_AHEAD, CAP_WIDTH = 1.0, 2.5, 1.6  # radii around an end in which its cap is
 
@@ -55,9 +54,9 @@ def bridge_gaps(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
 def gap_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[tuple[int, int], dict[str, float]]]:
     """What speaks for and against a bridge, for every end and the places that it points at: (leaf, vertex), and facts.
 
-    The facts are: the least winding number along the bridge, over the median on the skeleton; the cosine between bridge
-    and end; and how far the end is closed: the flux of its outward normals through its cross-section, 1 for a cap and 0
-    for a tube cut open, as a logarithm.
+    The facts are: the least winding number along the bridge, over the median on the skeleton; and how far the end is
+    closed: the flux of its outward normals through its cross-section, 1 for a cap and 0 for a tube cut open, as a
+    logarithm.
     """
     ends = list(_ends(skeleton))
     if not ends or not len(evidence.points):
@@ -67,44 +66,35 @@ def gap_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[tuple[in
         return  # parts too thin to have an inside, which could go on across a gap
     leaves = [end.leaf for end in ends]
     along = dijkstra(linked(skeleton.vertices, skeleton.edges), indices=leaves)
-    found = [
-        (end, other, float(cosine))
-        for i, end in enumerate(ends)
-        for other, cosine in _aims(skeleton, end, along[i], leaves, along)
-    ]
+    found = [(end, other) for i, end in enumerate(ends) for other in _aims(skeleton, end, along[i], leaves, along)]
     if not found:
         return
-    across = [skeleton.vertices[other] - end.place for end, other, _ in found]
+    across = [skeleton.vertices[other] - end.place for end, other in found]
     samples = [end.place + BRIDGE_SAMPLES * way for (end, *_), way in zip(found, across, strict=True)]
     winding = evidence.winding(np.concatenate(samples)).reshape(len(found), -1).min(axis=1) / typical
-    for (end, other, cosine), least in zip(found, winding, strict=True):
-        facts = dict(
-            winding=float(np.clip(least, -0.5, 1.3)),
-            straightness=cosine,
-            cap=float(np.log(_cap(end, evidence) + 0.1)),
-        )
+    for (end, other), least in zip(found, winding, strict=True):
+        facts = dict(winding=float(np.clip(least, -0.5, 1.3)), cap=float(np.log(_cap(end, evidence) + 0.1)))
         yield (end.leaf, other), facts
 
 
 def _aims(
     skeleton: Skeleton, end: _End, travelled: np.ndarray, leaves: list[int], along: np.ndarray
-) -> Iterator[tuple[int, float]]:
-    """Vertices that an end points at across a gap, and cosines: the nearest other end, and the nearest place else."""
+) -> Iterator[int]:
+    """Vertices that an end points at across a gap: the nearest other end, and the nearest place else."""
     across = skeleton.vertices - end.place
     away = np.maximum(norm(across), TINY)
     cosine = across @ end.outward / away
     free = skeleton.degree == 1
     gap = away - np.where(free, 0, skeleton.radii)
     aims = (gap < BRIDGE_REACH * end.radius) & (cosine > BRIDGE_COSINE) & (skeleton.degree > 0)
-    aims &= travelled > DETOUR * away + DETOUR_RADII * np.maximum(end.radius, skeleton.radii)
+    aims &= travelled > DETOUR * away
     cost = gap + away * (1 - cosine) / 2
     # what the way by an end leads to is behind it, and not asked for itself
     behind = ((away[leaves][:, None] + along)[aims[leaves]] < DETOUR * away).any(axis=0)
     for kind in (free, ~free & ~behind):
         some = np.flatnonzero(aims & kind)
         if len(some):
-            other = int(some[np.argmin(cost[some])])
-            yield other, cosine[other]
+            yield int(some[np.argmin(cost[some])])
 
 
 def _cap(end: _End, evidence: Evidence) -> float:
