@@ -25,15 +25,25 @@ from scipy.spatial import cKDTree
 from glsk_o3d import read_cloud, read_truth, samples
 from glsk_o3d.analysis import Truth
 from glsk_o3d.interop.clouds import cloud_points
+from glsk_o3d.samples.capsules import union_sample
 
 HOLES = 6  # in a built-in cloud with holes, each of them as far across as the part it is in
 SHOWN = 0.97  # least share of the true axis that a cloud must show for its skeleton to be scored
+
+
+def _uneven_y(n: int, *, noise: float, seed: int) -> samples.Sample:
+    """A stem and two arms 130 degrees apart, each of another radius."""
+    sine, cosine = np.sin(np.deg2rad(65)), np.cos(np.deg2rad(65))
+    nodes = 0.5 * np.array([[0, 0, 0], [0, 0, -1], [-sine, 0, cosine], [sine, 0, cosine]])
+    edges, radii = np.array([[0, 1], [0, 2], [0, 3]]), np.array([0.12, 0.12, 0.06, 0.04])
+    return union_sample("uneven_y", nodes, edges, radii, n, noise, seed)
+
 
 BUILTIN: dict[str, Callable[..., samples.Sample]] = {
     "tube": samples.tube,
     "thin_tube": partial(samples.tube, radius=0.04),
     "y_junction": samples.y_junction,
-    "uneven_y": partial(samples.y_junction, radii=(0.12, 0.06, 0.04), angle=130.0),
+    "uneven_y": _uneven_y,
     "torus": samples.torus,
     "thin_torus": partial(samples.torus, radius=0.05),
     "two_rings": samples.two_rings,
