@@ -77,9 +77,7 @@ def gap_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[tuple[in
         yield (end.leaf, other), facts
 
 
-def _aims(
-    skeleton: Skeleton, end: _End, travelled: np.ndarray, leaves: list[int], along: np.ndarray
-) -> Iterator[int]:
+def _aims(skeleton: Skeleton, end: _End, travelled: np.ndarray, leaves: list[int], along: np.ndarray) -> Iterator[int]:
     """Vertices that an end points at across a gap: the nearest other end, and the nearest place else."""
     across = skeleton.vertices - end.place
     away = np.maximum(norm(across), TINY)
