@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..decisions import QUESTIONS, Decision
+from ..numerics.neighbourhoods import plane_axes
 from ..numerics.polylines import arc_lengths, place_at, relative_distance
 from ..numerics.vectors import TINY, norm, unit
 from ..skeleton import Skeleton
@@ -148,7 +149,9 @@ def _beside(
     near = [path[np.searchsorted(s, s[-1] * OUTER_PLACES[1:-1])] for path, s in zip(paths, along, strict=True)]
     # the first direction is the section's, so that the others turn with the object
     tangent = unit((places[:, 2:] - places[:, :-2]).reshape(-1, 3))
-    second = unit(np.cross(tangent, width[np.concatenate(near)]))
+    second = np.cross(tangent, width[np.concatenate(near)])
+    # the width of a vertex without points is any direction, also along the branch
+    second = unit(np.where(norm(second)[:, None] > 1e-6, second, plane_axes(tangent)[:, :, 0]))
     turn = np.linspace(0, 2 * np.pi, ACROSS, endpoint=False)[:, None, None]
     across = np.cos(turn) * np.cross(second, tangent) + np.sin(turn) * second
     away = BESIDE * half[:, None, None] * across.reshape(ACROSS, len(paths), -1, 3)

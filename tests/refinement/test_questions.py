@@ -108,9 +108,10 @@ def test_the_object_is_beside_a_strand_and_nothing_beside_a_limb(turn):
     tube = np.column_stack([along, 0.3 * np.cos(t), 0.3 * np.sin(t)])
     out = np.column_stack([np.zeros(len(t)), np.cos(t), np.sin(t)])
     limb, width = np.array([[0, 0, 0], [1.5, 0, 0.0]]), np.tile([0, 1.0, 0], (2, 1))
-    assert (
-        _beside(evidence_of(tube @ turn, out @ turn), limb @ turn, width @ turn, [np.arange(2)], np.array([0.3])) < 0.05
-    )
+    # vertices without points have a width along the limb, if need be
+    for wide in (width, np.tile([1.0, 0, 0], (2, 1))):
+        around = evidence_of(tube @ turn, out @ turn)
+        assert _beside(around, limb @ turn, wide @ turn, [np.arange(2)], np.array([0.3])) < 0.05
 
 
 def test_limbs_do_not_depend_on_how_the_object_is_turned(refine, placed):

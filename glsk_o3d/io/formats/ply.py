@@ -26,6 +26,7 @@ from .graphs import NoEdges, graph_skeleton
 SECTION = ("half_width", "half_thickness")
 LONGEST_LINE = 1 << 16  # derived: far beyond any line of a header, so that an endless file without lines ends
 LONGEST_HEADER = 1 << 12  # derived: in lines, likewise
+MORE_THAN_PROMISED = "it holds more than its header promises"
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _KINDS = {
     **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4"},
@@ -155,7 +156,7 @@ def read_tables(stream: BinaryIO, *wanted: str) -> dict[str, Table]:
             tables[element.name] = text_table(lines, element)
         rest = next(lines, "").encode()
     if rest and sum(element.rows > 0 for element in elements) > 1:  # then a wrong count shifts what comes after it
-        raise ValueError("it holds more than its header promises")
+        raise ValueError(MORE_THAN_PROMISED)
     return {name: table for name, table in tables.items() if name in wanted}
 
 
@@ -209,7 +210,10 @@ def _row_by_row(element: Element, rows: Iterable[Take]) -> Table:
     found = [(array("q"), array("d")) for _ in element.columns]
     for take in rows:
         for (_, kind, counted), (counts, values) in zip(element.columns, found, strict=True):
-            n = int(take(counted, 1)[0]) if counted else 1
+            promised = take(counted, 1)[0] if counted else 1
+            n = int(promised)
+            if not 0 <= n == promised:
+                raise ValueError(f"a list of {element.name!r} has an impossible number of values")
             held = take(kind, n)
             check_promised(n, len(held), f"numbers in a row of {element.name!r}")
             counts.append(n)
@@ -258,7 +262,10 @@ def blocks(path: Path, rows: int, bare: bool) -> tuple[int | None, Iterator[Scan
     held = {element.name: element for element in elements if element.rows}
     if not order or "vertex" not in held or any(element.has_lists for element in held.values()):
         return None, map(_whole, [path])
-    check_elements(elements, order, path.stat().st_size - start)
+    size = path.stat().st_size - start
+    check_elements(elements, order, size)
+    if len(held) > 1 and size > sum(element.rows * element.least(order) for element in held.values()):
+        raise ValueError(MORE_THAN_PROMISED)
     for element in takewhile(lambda element: element.name != "vertex", elements):
         start += element.rows * element.least(order)
     vertex = held["vertex"]
@@ -295,7 +302,7 @@ def triangles(faces: Table, n: int) -> np.ndarray:
     if not isinstance(corners, Lists) or len(corners.counts) == 0:
         return NO_TRIANGLES
     counts = corners.counts.astype(np.int64)
-    if counts.min() < 1 or not ((corners.values >= 0) & (corners.values < n)).all():
+    if counts.min() < 1 or not ((corners.values >= 0) & (corners.values < n) & (corners.values % 1 == 0)).all():
         raise ValueError("a face has no corners, or one that is no vertex")
     fans = np.maximum(counts - 2, 0)
     first = np.repeat(np.cumsum(counts) - counts, fans)

@@ -120,6 +120,23 @@ def test_faces_of_what_is_no_vertex_are_refused(scan, format, face):
         scan(ply(format, ("vertex", XYZ, SQUARE), ("face", FACE, [((0, 1, 2, 3),), (face,)])))
 
 
+@pytest.mark.parametrize(
+    ("face", "says"), [("3 0 1 1.5", "no vertex"), ("2.7 0 1 2", "impossible"), ("-1 0", "impossible")]
+)
+def test_fractions_and_negative_counts_in_faces_are_refused(scan, face, says):
+    whole = ply("ascii", ("vertex", XYZ, SQUARE), ("face", FACE, [((0, 1, 2),)]))
+    with pytest.raises(FileFormatError, match=says):
+        scan(whole.replace(b"3 0 1 2\n", f"{face}\n".encode()))
+
+
+@all_formats
+def test_a_wrong_count_of_points_is_seen_by_what_follows_them(scan, format):
+    whole = ply(format, ("vertex", XYZ, SQUARE), ("camera", ["int number"], [(7,)]))
+    assert len(scan(whole)) == 4
+    with pytest.raises(FileFormatError, match="more than its header promises"):
+        scan(whole.replace(b"element vertex 4", b"element vertex 3"))
+
+
 @all_formats
 def test_properties_of_all_kinds(scan, format):
     columns = [*XYZ, *(f"uchar {name}" for name in ("red", "green", "blue")), *(f"float n{axis}" for axis in "xyz")]
