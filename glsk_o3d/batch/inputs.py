@@ -75,6 +75,8 @@ def _listed(path: Path) -> list[Path]:
         raise FileNotFoundError(
             f"{path}: no point cloud, since no line has three numbers, and no list of files, a path per line: {what}"
         )
+    if folder := next(filter(os.path.isdir, lines), None):
+        raise InvalidParameterError(f"{path}: {folder} is a folder: a list names files; give the folder itself")
     return [Path(os.path.abspath(line)) for line in lines]
 
 

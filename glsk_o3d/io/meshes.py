@@ -1,10 +1,12 @@
 """Triangle meshes from files, as scans of their vertices, and to files."""
 
+import json
 import os
 import re
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 
@@ -13,7 +15,7 @@ from ..interop.atomic import write_atomically
 from ..interop.packages import import_open3d
 from .formats import ply
 from .formats.graphs import line, text
-from .paths import check_promised, number_rows, text_lines, unknown_ending
+from .paths import check_budget, check_promised, number_rows, text_lines, unknown_ending
 from .scan import Scan
 
 WRITTEN_MESH_ENDINGS = (".ply", ".obj")
@@ -25,6 +27,8 @@ def read_vertices(path: Path) -> Scan:
     ending = path.suffix.lower()
     if ending == ".off":
         return _read_off(path)
+    if ending in (".gltf", ".glb"):
+        _check_rows(path)
     if ending != ".obj":
         return _read_open3d(path)
     with TemporaryDirectory() as folder:  # Open3D would read all textures that it names
@@ -40,6 +44,17 @@ def _read_open3d(path: Path) -> Scan:
     colors = np.asarray(mesh.vertex_colors) if mesh.has_vertex_colors() else None
     normals = np.asarray(mesh.vertex_normals) if mesh.has_vertex_normals() else None
     return Scan(np.asarray(mesh.vertices), colors, normals, {}, np.asarray(mesh.triangles))
+
+
+def _check_rows(path: Path) -> None:
+    """ValueError where glTF promises more rows than its files could hold: Open3D makes room for all of them first."""
+    content = path.read_bytes()
+    tree = content[20 : 20 + int.from_bytes(content[12:16], "little")] if content[:4] == b"glTF" else content
+    found = json.loads(tree)
+    named = (str(buffer.get("uri", "data:")) for buffer in found.get("buffers", ()))
+    others = (path.parent / unquote(uri) for uri in named if not uri.startswith("data:"))
+    held = len(content) + sum(other.stat().st_size for other in others if other.is_file())
+    check_budget(sum(int(accessor["count"]) for accessor in found.get("accessors", ())), held)
 
 
 def _read_off(path: Path) -> Scan:

@@ -19,7 +19,7 @@ from .sections import VertexPoints, measure_sections
 
 SPUR_POINTS = 128  # speed: of a branch that are enough to say how far it reaches
 SPUR_QUANTILE = 0.9  # fitted: share of a spur's points that its reach covers
-EPSILON = float(np.finfo(float).eps)  # a sheet has no half width; what stands out of it does so by many, not infinitely
+FAR_OUT = 20.0  # fitted: half widths beyond which a protrusion says no more; of no half width none count
 LEAST_OUT = 0.3  # fitted: half widths below which a protrusion says no more
 BESIDE = 2.0  # fitted: half widths from the curve to where nothing is beside a limb
 OUTER_PLACES = np.linspace(1 / 3, 1, 5)  # measured: of the length; each but the first and last is asked
@@ -108,9 +108,9 @@ def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
         own = cloud.points[cloud.members.of(body)]
         # by how far they are, and not as they come, which depends on how the object is turned
         points = own[np.argsort(norm(own - skeleton.vertices[junction]))][:: len(own) // SPUR_POINTS + 1]
-        out = max(_standing_out(limbs, k, junction, points, ending), 0)
+        out = np.clip(_standing_out(limbs, k, junction, points, ending), 0, FAR_OUT * own_half)
         facts = dict(
-            protrusion=float(np.log(out / max(own_half, EPSILON * out, TINY) + LEAST_OUT) * (1 - shared)),
+            protrusion=float(np.log(out / max(own_half, TINY) + LEAST_OUT) * (1 - shared)),
             confidence=float(weights @ confidence[body]),
             roundness=float(roundness[junction]),
         )

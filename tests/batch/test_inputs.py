@@ -160,3 +160,10 @@ def test_what_numbers_no_things_is_refused():
     table("a.csv", "x,y,z,tree", *(f"1,2,3,{i}" for i in range(10_001)))
     with pytest.raises(InvalidParameterError, match="has 10001 parts or more: it numbers no things"):
         apart("a.csv")
+
+
+def test_a_list_that_names_a_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("list.txt").write_text(".\n")
+    with pytest.raises(InvalidParameterError, match=r"list\.txt: \. is a folder: a list names files"):
+        find_inputs(["list.txt"], "out")

@@ -1,5 +1,7 @@
 """Triangle meshes from files, to files, and from Open3D."""
 
+import json
+
 import numpy as np
 import open3d as o3d
 import pytest
@@ -109,3 +111,10 @@ def test_what_is_not_written(tmp_path, tubes):
     with pytest.raises(FileFormatError, match=r"m\.ply: the mesh is empty: there is nothing to write"):
         save_mesh(to_tubes(Skeleton((), (), (), (), (), ())), tmp_path / "m.ply")
     assert not list(tmp_path.iterdir())
+
+
+def test_rows_that_no_file_could_hold_are_refused_before_there_is_room_for_them(tmp_path):
+    tree = {"asset": {"version": "2.0"}, "accessors": [{"count": 10**12, "type": "VEC3", "componentType": 5126}]}
+    (tmp_path / "m.gltf").write_text(json.dumps(tree))
+    with pytest.raises(FileFormatError, match=r"m\.gltf.*would take 1000000000000"):
+        read_scan(tmp_path / "m.gltf")
