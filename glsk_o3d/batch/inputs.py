@@ -75,14 +75,14 @@ def _listed(path: Path) -> list[Path]:
         raise FileNotFoundError(
             f"{path}: no point cloud, since no line has three numbers, and no list of files, a path per line: {what}"
         )
-    if folder := next(filter(os.path.isdir, lines), None):
-        raise InvalidParameterError(f"{path}: {folder} is a folder: a list names files; give the folder itself")
     return [Path(os.path.abspath(line)) for line in lines]
 
 
 def _named(roots: dict[Path, Path]) -> dict[Path, str]:
     """The names of the results of files, from the folders from which these count."""
     whole = {path: path.relative_to(root if path.is_relative_to(root) else path.anchor) for path, root in roots.items()}
+    # of the folder itself, which a list may name by mistake, nothing is left
+    whole = {path: name if name.name else Path(path.name or "folder") for path, name in whole.items()}
     short = {path: name.with_suffix("").as_posix() for path, name in whole.items()}
     taken = Counter([*short.values(), *RESERVED_STEMS])
     named = {path: short[path] if taken[short[path]] == 1 else name.as_posix() for path, name in whole.items()}
