@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import FileFormatError
 from ..interop.atomic import write_atomically
 from ..interop.packages import import_open3d
-from .formats import ply
+from .formats import gltf, ply
 from .formats.graphs import line, text
 from .paths import check_budget, check_promised, number_rows, text_lines, unknown_ending
 from .scan import Scan
@@ -48,13 +48,14 @@ def _read_open3d(path: Path) -> Scan:
 
 def _check_rows(path: Path) -> None:
     """ValueError where glTF promises more rows than its files could hold: Open3D makes room for all of them first."""
-    content = path.read_bytes()
-    tree = content[20 : 20 + int.from_bytes(content[12:16], "little")] if content[:4] == b"glTF" else content
-    found = json.loads(tree)
-    named = (str(buffer.get("uri", "data:")) for buffer in found.get("buffers", ()))
+    with path.open("rb") as stream:
+        head = stream.read(20)
+        binary = head[:4] == gltf.MAGIC.to_bytes(4, "little")
+        tree = json.loads(stream.read(int.from_bytes(head[12:16], "little")) if binary else head + stream.read())
+    named = (str(buffer.get("uri", "data:")) for buffer in tree.get("buffers", ()))
     others = (path.parent / unquote(uri) for uri in named if not uri.startswith("data:"))
-    held = len(content) + sum(other.stat().st_size for other in others if other.is_file())
-    check_budget(sum(int(accessor["count"]) for accessor in found.get("accessors", ())), held)
+    held = sum(file.stat().st_size for file in (path, *others) if file.is_file())
+    check_budget(sum(int(accessor["count"]) for accessor in tree.get("accessors", ())), held)
 
 
 def _read_off(path: Path) -> Scan:

@@ -23,7 +23,7 @@ FAR_OUT = 20.0  # fitted: half widths beyond which a protrusion says no more; of
 LEAST_OUT = 0.3  # fitted: half widths below which a protrusion says no more
 BESIDE = 2.0  # fitted: half widths from the curve to where nothing is beside a limb
 OUTER_PLACES = np.linspace(1 / 3, 1, 5)  # measured: of the length; each but the first and last is asked
-ACROSS = 16  # measured: across a branch; eight are enough for flat parts, but depend on how they are turned
+ACROSS = 16  # measured: directions across a branch; eight are enough for flat parts
 
 
 def prune_spurs(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Decision]]:
@@ -144,9 +144,13 @@ def _beside(
     three places the mean counts. `paths` are branches, as numbers of `vertices` (m, 3), whose sections are widest in
     the directions `width` (m, 3); and `half` (b,) the half widths.
     """
-    along = [arc_lengths(vertices[path]) for path in paths]
-    places = np.array([place_at(vertices[path], s, s[-1] * OUTER_PLACES) for path, s in zip(paths, along, strict=True)])
-    near = [path[np.searchsorted(s, s[-1] * OUTER_PLACES[1:-1])] for path, s in zip(paths, along, strict=True)]
+    found, near = [], []
+    for path in paths:
+        along = arc_lengths(vertices[path])
+        asked = along[-1] * OUTER_PLACES
+        found.append(place_at(vertices[path], along, asked))
+        near.append(path[np.searchsorted(along, asked[1:-1])])
+    places = np.array(found)
     # the first direction is the section's, so that the others turn with the object
     tangent = unit((places[:, 2:] - places[:, :-2]).reshape(-1, 3))
     second = np.cross(tangent, width[np.concatenate(near)])
