@@ -31,12 +31,14 @@ class Refiner(Filter[Skeleton]):
     1. Edges on triangles are collapsed, the shortest first, until there is no triangle. This step is published; with
        all options 0 it is the only one.
     2. Loops narrower than their tube are collapsed, detached vertices brought back, and edges subdivided.
-    3. The curve and its radii are fitted to the axis of the surface: to the normals of the points around, even if only
-       one side was scanned, and to the points themselves where noise has spoilt the normals.
+    3. The curve and its radii are fitted to the axis of the surface, to the normals of the points around, even if only
+       one side was scanned; again after every change of the graph.
     4. The topology is judged by the surface around the curve: false loops are closed, spurs pruned, branches that cross
        air cut, and gaps bridged across which the object continues.
-    5. Junctions move to where limbs meet, and ends grow along their limbs to where these stop.
-    6. The sections are measured, and warnings are collected.
+    5. The curve settles: it is fitted once more, also to the points themselves where noise has spoilt the normals, and
+       where they hardly differ, as of a leaf of which one side was scanned.
+    6. Junctions move to where limbs meet, and ends grow along their limbs to where these stop.
+    7. The sections are measured, and warnings are collected.
 
     Warns
     -----
@@ -80,7 +82,10 @@ class Refiner(Filter[Skeleton]):
     )
     spacing: float = parameter(0.5, "Longest edge over the local radius, by subdivision; 0 leaves the edges.", low=0)
     recentre: int = parameter(
-        1, "Passes that fit the curve to the axis of the surface; 0 leaves it.", unit="passes", low=0
+        1,
+        "Passes of a fit of the curve to the axis of the surface; the last fit has one. 0 leaves it.",
+        unit="passes",
+        low=0,
     )
 
     def _run(self, given: Skeleton, watch: Watch | None) -> Skeleton:

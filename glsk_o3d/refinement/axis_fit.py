@@ -71,7 +71,7 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
     The doubt d, from 0 to 1, is the share of the distance from the curve that the normals do not explain: noise as wide
     as the part, whose points say more than their normals. Of a leaf seen from one side the normals hardly differ, and
     meet far behind it: e is the direction most of them have, a the share of their squares across it, and a_0 that of a
-    quarter of a tube.
+    quarter of a tube. An edge has the mean K of its two ends, and of it what is across the edge.
 
     The confidence is (1 - d) c / (c + 8), where c counts over the vertex and its neighbours. The radii are those of
     circles with the area of the section, see `robust_radii`, or without passes `plane_distance_radii`. Points belong to
