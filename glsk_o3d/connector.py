@@ -7,16 +7,13 @@ import numpy as np
 
 from .numerics.farthest_point import farthest_point_sampling
 from .numerics.groups import group_median, group_sum
-from .numerics.neighbourhoods import nearest_neighbours, row_medians, uprightness
+from .numerics.neighbourhoods import nearest_neighbours, row_medians
 from .numerics.radii import plane_distance_radii
 from .numerics.vectors import norm
 from .parameters import documented, parameter, resolve_length
 from .pipeline import Filter, Watch
 from .skeleton import Skeleton
 from .state import Contraction
-
-FACING_UPRIGHTNESS = 0.1  # fitted: uprightness of two normals below which their surfaces face each other
-FACING_NOISE = 0.2  # fitted: share of noise below which that counts
 
 
 @documented
@@ -63,7 +60,7 @@ class Connector(Filter[Skeleton]):
     )
     links: Literal["all", "nearest"] = parameter(
         "all",
-        "Join a point's vertex with those of all its foreign ring neighbours, except across gaps, or of the nearest.",
+        "Join a point's vertex with those of all its foreign ring neighbours, or of the nearest.",
         choices=("all", "nearest"),
     )
 
@@ -92,24 +89,12 @@ class Connector(Filter[Skeleton]):
         rings = state.rings
         a, b = vertex_of_survivor[rings.centres], vertex_of_survivor[rings.indices]
         link = a != b
-        if self.links == "all":
-            link &= ~across_gaps(state)
-        else:
+        if self.links == "nearest":
             length = np.where(link, rings.edge_lengths(state.positions), np.inf)
             link &= length == np.repeat(np.minimum.reduceat(length, rings.indptr[:-1]), rings.sizes)
         a, b = a[link], b[link]
         m = vertex_of_survivor.max() + 1
         return np.column_stack(np.divmod(np.unique(np.minimum(a, b) * m + np.maximum(a, b)), m))
-
-
-def across_gaps(state: Contraction) -> np.ndarray:
-    """Whether each ring link runs between surfaces that face each other: there is air, or the inside of a part.
-
-    Only where there is no noise, since it spoils the normals.
-    """
-    p, q = state.survivors[state.rings.centres], state.survivors[state.rings.indices]
-    facing = uprightness(state.cloud, state.normals, p, q) < FACING_UPRIGHTNESS
-    return facing & (np.maximum(state.noise[p], state.noise[q]) < FACING_NOISE)
 
 
 def contraction_distance(state: Contraction) -> np.ndarray:

@@ -13,7 +13,7 @@ from .refinement.diagnostics import measured
 from .refinement.ends import regrow_ends
 from .refinement.evidence import Evidence, SurfaceGraph, in_order, on_sample
 from .refinement.junctions import move_junctions
-from .refinement.loops import close_loops, collapse_narrow_loops
+from .refinement.loops import close_loops
 from .refinement.merging import binary_size, collapse_triangles, scaled
 from .refinement.spurs import prune_spurs
 from .skeleton import Skeleton
@@ -30,7 +30,7 @@ class Refiner(Filter[Skeleton]):
 
     1. Edges on triangles are collapsed, the shortest first, until there is no triangle. This step is published; with
        all options 0 it is the only one.
-    2. Loops narrower than their tube are collapsed, detached vertices brought back, and edges subdivided.
+    2. Detached vertices are brought back, and edges subdivided.
     3. The curve and its radii are fitted to the axis of the surface, to the normals of the points around, even if only
        one side was scanned; again after every change of the graph.
     4. The topology is judged by the surface around the curve: false loops are closed, spurs pruned, branches that cross
@@ -108,8 +108,6 @@ class Refiner(Filter[Skeleton]):
         """Make the graph one-dimensional and centre it in the surface around it."""
         skeleton = collapse_triangles(skeleton, by_degree=self.collapse == "degree")
         surface = SurfaceGraph.of(skeleton)
-        if self.handle:
-            skeleton = collapse_narrow_loops(skeleton, surface)
         if self.recentre:
             skeleton = pull_back_detached(skeleton)
         return self._centred(skeleton, surface), surface

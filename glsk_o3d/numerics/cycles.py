@@ -1,6 +1,5 @@
 """Cycles of a graph embedded in space, and how wide they open."""
 
-from collections.abc import Iterator
 from typing import TypeAlias
 
 import numpy as np
@@ -107,24 +106,13 @@ def inscribed_circle(points: np.ndarray) -> tuple[np.ndarray, float]:
 
     The centre is found on a grid that is refined twice; the radius is good to about 1 %.
     """
-    *_, widest = _circles(points)
-    return widest
-
-
-def opens_wider(points: np.ndarray, radius: float) -> bool:
-    """Whether `inscribed_circle` has at least this radius; it stops as soon as a circle is wide enough."""
-    return any(found >= radius for _, found in _circles(points))
-
-
-def _circles(points: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
-    """Ever wider circles inside a closed curve: on a coarse and a fine grid of its box, and on two around the best."""
     middle = points.mean(axis=0)
     axes = np.linalg.svd(points - middle, full_matrices=False)[2]
     polygon = (points - middle) @ axes.T
     low, high = polygon[:, :2].min(axis=0), polygon[:, :2].max(axis=0)
     centre, best = np.zeros(3), 0.0
     at, span = (low + high) / 2, high - low
-    for n, finer in ((5, 1), (21, 5), (11, 5), (11, 1)):
+    for n in (21, 11, 11):
         x, y = (np.linspace(-0.5, 0.5, n)[:, None] * span + at).T
         grid = np.stack([*np.meshgrid(x, y), np.zeros((n, n))], axis=-1).reshape(-1, 3)
         grid = grid[_inside(grid, polygon)]
@@ -132,9 +120,8 @@ def _circles(points: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
             distance = _distance(grid, polygon)
             if distance.max() > best:
                 best, centre = float(distance.max()), grid[np.argmax(distance)]
-        yield centre @ axes + middle, best
-        if finer > 1:
-            at, span = centre[:2], span / finer
+        at, span = centre[:2], span / 5
+    return centre @ axes + middle, best
 
 
 def _distance(points: np.ndarray, polygon: np.ndarray) -> np.ndarray:

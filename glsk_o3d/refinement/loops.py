@@ -5,41 +5,19 @@ from typing import NamedTuple
 import numpy as np
 
 from ..decisions import QUESTIONS, Decision
-from ..numerics.cycles import inscribed_circle, minimum_cycle_basis, opens_wider
+from ..numerics.cycles import inscribed_circle, minimum_cycle_basis
 from ..numerics.groups import component_labels
 from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import TINY
 from ..skeleton import Skeleton
-from .evidence import LEAST_INSIDE, Evidence, SurfaceGraph
+from .evidence import LEAST_INSIDE, Evidence
 from .merging import collapse_triangles, drop_edges, merge_vertices
 from .sections import VertexPoints
 
-HOLE_WINDING = 0.25  # fitted: winding number in a hole, over that along the loop: near 0, and .5 or more inside a part
 WIDE_LOOP = 1.5  # fitted: opening of a loop that is more than two strands in one part
 WIDE_OPEN = 3.0  # fitted: opening beyond which it says no more: sparse crowns have wide false loops
 HOLE_SHARE = 0.6  # fitted: of the largest circle in a loop, the part of it that is asked
 DIRECTIONS = np.column_stack([f(np.arange(6) * np.pi / 3) for f in (np.cos, np.sin)])  # derived: six, evenly
-
-
-def collapse_narrow_loops(skeleton: Skeleton, graph: SurfaceGraph) -> Skeleton:
-    """Collapse the loops that open less than their tube is thick, before there is a fit: they lie inside one part.
-
-    The opening of a loop is the radius of the largest circle inside it; the tube's is the median over the loop of the
-    distance from its vertices to the surface. All such loops of a minimum cycle basis go at once, until there are none.
-    A loop around a hole stays, however narrow: the winding number in that circle is near 0.
-    """
-    evidence: Evidence | None = None
-    while True:
-        surface = VertexPoints(skeleton).distance
-        cycles = minimum_cycle_basis(len(surface), skeleton.edges, skeleton.edge_lengths)
-        narrow = [cycle for cycle in cycles if not opens_wider(skeleton.vertices[cycle], np.median(surface[cycle]))]
-        if narrow:
-            evidence = evidence or Evidence.of(skeleton, graph)
-            holes = _holes(skeleton, narrow, evidence)
-            narrow = [cycle for cycle, hole in zip(narrow, holes, strict=True) if hole.share > HOLE_WINDING]
-        if not narrow:
-            return skeleton
-        skeleton = _collapsed(skeleton, narrow)
 
 
 def _collapsed(skeleton: Skeleton, cycles: list[np.ndarray]) -> Skeleton:

@@ -64,7 +64,7 @@ def test_two_strands_in_one_tube_become_a_path(piped, refine, gap, side):
     skeleton = refine(raw, handle=0.5)
     assert (raw.n_loops, counts(skeleton), len(skeleton.junctions)) == (1, (1, 0, 2), 0)
     assert np.abs(skeleton.vertices[:, 1]).max() < 0.4 * gap
-    assert skeleton.report.n_loops_closed == (gap > 0.15)  # narrower ones are collapsed before anybody asks
+    assert skeleton.report.n_loops_closed == 1
     assert refine(raw).n_loops == 1
 
 
