@@ -31,6 +31,7 @@ IDEAS = {
     "stop by score": "Contractor.stop=RingSizeRatio",
     "stop at 3 %": "ExplainedScore.threshold=0.02",
     "last solve kept": "Contractor.keep_last=false",
+    "floor of attraction": "Contractor.min_attraction=0",
     "hold on lines": "Contractor.line_hold=1",
     "runaways held": "Contractor.retries=0",
     "sampling by thickness": "Connector.radius=2% Connector.thickness=0",

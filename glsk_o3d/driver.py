@@ -47,6 +47,7 @@ class Options(TypedDict, total=False):
     initial_contraction: float
     amplification: float
     max_contraction: float
+    min_attraction: float
     line_hold: float
     keep_last: bool
     retries: int

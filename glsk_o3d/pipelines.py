@@ -51,7 +51,7 @@ def _published(**contraction: Any) -> Pipeline[Skeleton]:
     return (
         Sampler(size="all", frame="box")
         | RingBuilder(k="published")
-        | Contractor(line_hold=1, keep_last=False, retries=0, **contraction)
+        | Contractor(min_attraction=0, line_hold=1, keep_last=False, retries=0, **contraction)
         | Connector(radius="2%", thickness=0, links="nearest")
         | Refiner(collapse="degree", handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)
     )
