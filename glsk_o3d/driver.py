@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypedDict, overload
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from .contractor import Contractor, Reducer
+from .contractor import Contractor
 from .errors import InvalidCloudError, InvalidParameterError
-from .interop.clouds import SearchParam, open3d_class
+from .interop.clouds import open3d_class
 from .interop.packages import import_open3d
 from .lpr_reducer import LPRReducer
 from .parameters import check_number
@@ -20,75 +20,11 @@ from .recipes.catalogue import named_pipeline
 from .ring_builder import RingBuilder
 from .skeleton import Skeleton
 from .state import Contraction
-from .stopping import StopRule
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack  # which type checkers bring
-
 
 PipelineChoice: TypeAlias = Pipeline[Skeleton] | str | os.PathLike[str] | Mapping[str, Any]
 """A pipeline, its name, the path of a recipe, or options for the default."""
 
 
-class Options(TypedDict, total=False):
-    """The options of the filters in the named pipelines that `skeletonize` takes by their names alone."""
-
-    size: int | Literal["auto", "all"]
-    frame: Literal["spread", "box"]
-    drop_invalid: bool
-    outlier_factor: float
-    denoise: int
-    around: float
-    thin_to: int | Literal["auto", "all"]
-    k: int | Literal["auto", "published"] | SearchParam
-    reducer: Reducer | None
-    stop: StopRule
-    max_iterations: int
-    initial_contraction: float
-    amplification: float
-    max_contraction: float
-    min_attraction: float
-    line_hold: float
-    keep_last: bool
-    retries: int
-    max_attraction: float
-    phi: float
-    conserve_mass: bool
-    mend_rings: bool
-    order: Literal["cheapest", "index"]
-    threshold: float
-    min_iterations: int
-    thickness: float
-    links: Literal["all", "nearest"]
-    collapse: Literal["length", "degree"]
-    handle: float
-    air: float
-    bridge: float
-    limb: float
-    spacing: float
-    recentre: int
-    surface: float
-    root: str | Any
-
-
-@overload
-def skeletonize(
-    cloud: Any,
-    pipeline: Literal["default", "tree", "wen2024", "cao2010"] = ...,
-    *,
-    on_iteration: OnIteration | None = ...,
-    on_state: OnState | None = ...,
-    **options: Unpack[Options],
-) -> Skeleton: ...
-@overload
-def skeletonize(
-    cloud: Any,
-    pipeline: PipelineChoice,
-    *,
-    on_iteration: OnIteration | None = ...,
-    on_state: OnState | None = ...,
-    **options: Any,
-) -> Skeleton: ...
 def skeletonize(
     cloud: Any,
     pipeline: PipelineChoice = "default",
@@ -110,8 +46,8 @@ def skeletonize(
     on_state : callable, optional
         Called before `on_iteration` with the Contraction after each solve, such as a `ContractionRecorder`.
     **options
-        Parameters of the filters, by name; type checkers know them. If more than one filter has the name, give a
-        mapping, ``{"Connector.radius": "2%"}``: as `pipeline` for ``"default"``, else to `Pipeline.with_options`.
+        Parameters of the filters, by name. If more than one filter has the name, give a mapping,
+        ``{"Connector.radius": "2%"}``: as `pipeline` for ``"default"``, else to `Pipeline.with_options`.
 
     Returns
     -------

@@ -79,7 +79,7 @@ def test_a_parameter_of_any_type_takes_its_words_and_no_others(word):
     with pytest.raises(InvalidParameterError, match=r"'auto'.*'published'"):
         RingBuilder(k=word)
     RingBuilder(k="auto")
-    assert "k : 'auto' or 'published' or int [points], default 'auto'" in RingBuilder.__doc__
+    assert "k : 'auto' or 'published' or int [points], at least 4, at most 256, default 'auto'" in RingBuilder.__doc__
     assert "frame : 'spread' or 'box', default 'spread'" in Sampler.__doc__  # only words
 
 

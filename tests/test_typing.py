@@ -1,20 +1,12 @@
 """What type checkers say of a user's script: mistakes are found, and nothing else is."""
 
-import dataclasses
 import importlib.util
 import json
 import re
 import subprocess
 import sys
-from contextlib import suppress
-from typing import get_type_hints
 
 import pytest
-
-from glsk_o3d.driver import Options
-from glsk_o3d.errors import InvalidParameterError
-from glsk_o3d.pipeline import parts
-from glsk_o3d.pipelines import PIPELINES
 
 SCRIPT = """\
 import numpy as np
@@ -58,9 +50,6 @@ glsk.to_line_set(skeleton, "brnch")  # wrong
 skeleton.to_line_set().colours  # wrong
 glsk.skeletonise(cloud)  # wrong
 glsk.skeletonize(cloud, 12)  # wrong
-glsk.skeletonize(cloud, k="abc")  # wrong
-glsk.skeletonize(cloud, handel=0.3)  # wrong
-glsk.skeletonize(cloud, links="al")  # wrong
 glsk.skeletonize(cloud, on_iteration=lambda record: record.n_point > 100)  # wrong
 pipelines.default()(cloud).n_loop  # wrong
 (RingBuilder() | Contractor())(cloud).vertices  # wrong
@@ -109,12 +98,3 @@ def test_mistakes_are_found_and_nothing_else_is(checker, script, root):
     wrong = {number for number, line in lines.items() if line.endswith("# wrong")}
     assert {number: lines[number] for number in wrong - set(found)} == {}
     assert {number: (lines[number], text) for number, text in found.items() if number not in wrong} == {}
-
-
-def test_the_options_of_skeletonize_are_those_of_the_filters():
-    found = {}
-    for pipeline in (make() for make in PIPELINES.values()):
-        for name in {field.name for part in parts(pipeline) for field in dataclasses.fields(part)}:
-            with suppress(InvalidParameterError):  # more than one part has it
-                found[name] = get_type_hints(pipeline.class_of_option(name)[0])[name]
-    assert get_type_hints(Options) == found

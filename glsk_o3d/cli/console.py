@@ -37,14 +37,14 @@ def echo(text: str = "", *, err: bool = False) -> None:
 
 def say(kind: str, message: str) -> None:
     """Print one line to stderr, yellow for a "warning" and red for an "error"; other kinds are "info" and "debug"."""
-    style = {"error": "red", "warning": "yellow"}.get(kind, "dim")
-    prefix = f"glsk: {kind}: " if kind in ("error", "warning") else "glsk: "
-    console(stderr=True).print(prefix + visible(" ".join(message.split())), style=style, soft_wrap=True)
+    color = {"error": "red", "warning": "yellow"}.get(kind)
+    prefix = f"glsk: {kind}: " if color else "glsk: "
+    typer.secho(prefix + visible(" ".join(message.split())), err=True, fg=color, dim=not color)
 
 
 def heading(text: str) -> None:
     """Print a bold line on stdout."""
-    console().print(visible(text), style="bold", soft_wrap=True)
+    typer.secho(visible(text), bold=True)
 
 
 def console(*, stderr: bool = False) -> Any:

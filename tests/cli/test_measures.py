@@ -95,5 +95,5 @@ def test_a_tree_taller_than_any_is_in_doubt(invoke, tmp_path, y):
     large = replace(small, vertices=1000 * small.vertices, radii=1000 * small.radii)
     save_skeleton(large, tmp_path / "mm.ply")
     first, _ = invoke("tree", "mm.ply", "--up", "z", "--root", "z").stderr.splitlines()
-    assert first.endswith("none is known above 116 m: is a unit of the cloud 1 m? name it: unit='mm', --unit mm")
+    assert first.endswith("none is known above 116 m: is a unit of the cloud 1 m? name it: --unit mm")
     assert invoke("tree", "mm.ply", "--unit", "mm", "--up", "z", "--root", "z").stderr == ""
