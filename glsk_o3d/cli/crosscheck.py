@@ -40,7 +40,7 @@ def crosscheck(
         check = cross_check(cloud, pipeline=chosen)
         facts = {"scan": printable(scan), **check.to_dict()}
         files = write_each([numbers], facts) | write_each([angles], check)
-    told = {"because": facts["reasons"], "which is": MEANINGS[check.verdict], "surface": check.surface}
+    told = {"because": facts["reasons"], "which is": MEANINGS[check.verdict]}
     told |= {name: facts[name] for name in ("points", "mesh", "rows", "skeletons")}
     tell(facts, lambda: print_rows(told, title=f"{scan}: {check.verdict}"), files)
     if check.verdict == UNTOLD:

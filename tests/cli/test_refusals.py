@@ -15,8 +15,8 @@ TABLE = """
     2 branches y.ply -o y.txt                              | y.txt: the table is CSV and its name ends in .csv
     2 tree y.ply --root a,b,c                              | root = 'a,b,c': must be an axis
     2 tree y.ply --unit 0                                  | unit = '0': must be metres, above 0, or one of m, cm, mm
-    2 tree o.ply                                           | 1 loops: cylinders need a tree; see 'glsk skeletonize --pipeline tree'
-    2 tree two.json                                        | 2 components: cylinders need one tree; see 'glsk skeletonize --pipeline tree' and 'glsk edit --largest'
+    2 tree o.ply                                           | see 'glsk skeletonize --pipeline tree'
+    2 tree two.json                                        | --pipeline tree' and 'glsk edit --largest'
     2 tree y.ply -o c.xlsx                                 | c.xlsx: the file is a table of cylinders and its name ends
     2 edit o.ply                                           | nothing to write: give an output with -o
     2 edit o.ply -o o.ply                                  | o.ply: is an input
@@ -37,7 +37,7 @@ TABLE = """
     2 grasps rod.npz --opening 1 --cone z                  | --cone ,z: write 4 numbers
     2 grasps rod.npz --opening 1 --cone z,270              | the angle of cone = 270.0: must be
     2 grasps rod.npz --opening 1 -o g.ply                  | the grasps are JSON or CSV and its name ends in .json
-    2 grasps y.ply --opening 1                             | has no confidence, perhaps due to its file: give --min-confidence 0
+    2 grasps y.ply --opening 1                             | has no confidence, perhaps due to its file: give --min-
     2 grasps y.ply --opening 1 --min-confidence 0          | has no points of the object: give --cloud FILE
     1 grasps rod.npz --opening 1 --scene none.ply          | none.ply: no such file
     1 evaluate y.ply SCANS/ring.ply --truth none.npz       | none.npz: not a valid truth: the truth has no nodes
@@ -75,7 +75,7 @@ BEFORE_ANY_RUN = """
     1 skeletonize none.ply -o s.ply                        | none.ply: no such file
     1 skeletonize SCANS/empty.ply -o s.ply                 | empty.ply: the file is empty
     1 skeletonize folder.ply -o s.ply                      | folder
-    1 skeletonize SCANS/nan.ply -o s.ply                   | nan.ply: 2 of 1000 points have NaN or infinite coordinates, the first at index 3: drop them with --drop-invalid
+    1 skeletonize SCANS/nan.ply -o s.ply                   | the first at index 3: drop them with --drop-invalid
     1 skeletonize none.xyz -o s.ply                        | none.xyz: none of its 20 points has finite coordinates
     2 run                                                  | a SCRIPT and a SCAN are needed
     2 run glskeleton SCANS/ring.ply                        | nothing to write
