@@ -30,8 +30,8 @@ show(check)
 plt.show()
 
 # %%
-# The same with noise on one arm. The rows notice it before the skeleton does: on that arm the mesh does not close around
-# many points, which are grey, and both skeletons are still one.
+# The same with noise on one arm. The rows notice it before the skeleton does: on that arm the mesh does not close
+# around many points, which are grey, and both skeletons are still one.
 
 noise = np.random.default_rng(0).normal(scale=0.003, size=clean.shape)
 noisy = clean + noise * (clean[:, :1] < -0.1)

@@ -34,7 +34,12 @@ def filters(
         "filters": [_filter_facts(cls) for key, cls in known.items() if name in (None, key)],
         "pipelines": [_pipeline_facts(key, make) for key, make in pipelines.items() if name in (None, key)],
     }
-    tell(found, lambda: [_print(facts, full=name is not None) for facts in chain(*found.values())])
+
+    def words() -> None:
+        for facts in chain(*found.values()):
+            _print(facts, full=name is not None)
+
+    tell(found, words)
 
 
 def _filter_facts(cls: type[Parameters]) -> dict[str, Any]:

@@ -17,7 +17,6 @@ from .options import SKELETON_ENDINGS
 from .reporting import WrongUsage
 
 if TYPE_CHECKING:
-    from ..refinement.rooted import RootPlace
     from ..viewing.page import ContractionRecorder
 
 
@@ -37,14 +36,13 @@ def skeleton_outputs(
     *,
     title: str = "",
     cut_loops: bool = False,
-    root: RootPlace | None = None,
     recorder: ContractionRecorder | None = None,
 ) -> list[Output]:
     """The files of a skeleton, its picture and its page; the recorder watches the run, for the page."""
     from .. import save_preview, save_report, save_skeleton
 
     endings = tuple(f".{ending}" for ending in SKELETON_ENDINGS)
-    save = partial(save_skeleton, cut_loops=cut_loops, root=root)
+    save = partial(save_skeleton, cut_loops=cut_loops)
     return [
         *(Output(path, endings, "file is a skeleton", save) for path in skeletons or []),
         Output(preview, (".png",), "picture is a PNG", partial(save_preview, title=title)),

@@ -13,7 +13,7 @@ LABELS = ("branch", "label", "classification")
 
 
 def view(
-    file: Annotated[Path, argument("SKELETON|SCAN", "In any format that is read or written; see 'glsk info'.")],
+    file: Annotated[Path, argument("SKELETON|SCAN", "In any format that is read.")],
     preview: Annotated[Path | None, option("PNG", "Open no window: draw a picture.")] = None,
     report: Annotated[Path | None, option("HTML", "Open no window: write a page for the browser.")] = None,
     color: Annotated[str | None, option("ATTRIBUTE", "In the window, colour the points of a scan by it.")] = None,

@@ -104,18 +104,6 @@ def test_attributes_and_conditions_on_them(invoke, told, refused, tmp_path):
     assert refused(1, "info", "c.csv", "--where", "x > 99") == "there is no point with x > 99"
 
 
-def test_without_a_file_it_lists_what_can_be_read_and_what_is_missing(invoke, monkeypatch):
-    told = json.loads(invoke("info", "--json").stdout)
-    assert {".las", ".laz", ".e57", ".csv", ".ply"} <= set(told["clouds"])
-    assert ".swc" in told["skeletons"]
-    assert ".vtp" in told["only_written"]
-    text = invoke("info").stdout
-    assert all(ending in text for endings in told.values() for ending in endings)
-    monkeypatch.setitem(sys.modules, "pye57", None)
-    assert list(json.loads(invoke("info", "--json").stdout)["lacking"]) == [".e57"]
-    assert ".e57 pye57 cannot be imported: pip install" in " ".join(invoke("info").stdout.split())
-
-
 def test_a_large_cloud_is_told_block_by_block(told, tmp_path, monkeypatch):
     random = np.random.default_rng(2)
     places = random.normal(size=(500, 3))

@@ -22,9 +22,7 @@ TABLE = """
     2 edit o.ply -o o.ply                                  | o.ply: is an input
     1 convert o.ply a.swc                                  | a.swc: this format holds trees only
     2 convert o.ply a.nope                                 | a.nope: the file is a skeleton and its name ends in
-    2 convert y.ply a.ply --root x                         | for others use 'glsk edit'
-    2 rig y.ply                                            | nothing to write: give one output with -o
-    2 rig y.ply -o a.glb -o b.glb                          | rig writes one file: give one output with -o
+    2 convert y.ply                                        | nothing to write: give a FILE, or -o FILE
     2 rig none.ply -o r.fbx                                | r.fbx: the rig is glTF or BVH and its name ends in .glb
     1 rig y.ply y.ply -o r.glb                             | y.ply: is a skeleton, not a scan
     1 rig y.ply junk.ply -o r.glb                          | junk.ply: not a valid .ply file: it does not start with
@@ -62,7 +60,6 @@ BEFORE_ANY_RUN = """
     2 skeletonize SCANS/ring.ply --report s.pdf            | s.pdf: the report is a page and its name ends in .html
     2 skeletonize SCANS/ring.ply --tubes s.xyz             | s.xyz: the tubes are a mesh and its name ends in .ply or
     2 skeletonize SCANS/ring.ply --labelled s.pcd          | s.pcd: the cloud with labels is PLY and its name ends
-    2 skeletonize SCANS/ring.ply --save-recipe a.yaml -o a.ply | a.yaml: the file is a recipe and its name ends in
     2 skeletonize SCANS/ring.ply -o s.ply -o ./s.ply       | s.ply: is named twice
     2 skeletonize SCANS/ring.ply -o SCANS/ring.ply         | is an input
     1 skeletonize SCANS/ring.ply -o no/where/s.ply         | no/where: no such folder
@@ -71,7 +68,6 @@ BEFORE_ANY_RUN = """
     2 skeletonize SCANS/ring.ply -o s.ply --pipeline wen2042 | no pipeline is called 'wen2042': did you mean 'wen2024'?
     2 skeletonize SCANS/ring.ply -o s.ply --set radios=1   | did you mean 'radius'
     2 skeletonize SCANS/ring.ply -o s.ply --set Connector.radius=-1 | Connector.radius = -1.0: must be above 0
-    2 skeletonize SCANS/ring.ply -o s.ply --stream --pipeline wen2024 | this pipeline takes all points of a cloud
     1 skeletonize none.ply -o s.ply                        | none.ply: no such file
     1 skeletonize SCANS/empty.ply -o s.ply                 | empty.ply: the file is empty
     1 skeletonize folder.ply -o s.ply                      | folder

@@ -69,17 +69,6 @@ def test_every_named_pipeline(invoke, scans, tmp_path, name):
     assert set(report.stages) >= {repr(stage) for stage in PIPELINES[name]().stages}
 
 
-@pytest.mark.parametrize("pipeline", ["default", "wen2024"])
-def test_a_root_makes_a_tree_of_any_pipeline(invoke, scans, tmp_path, pipeline):
-    words = ("skeletonize", scans / "ring.ply", "-o", "r.json", "--pipeline", pipeline, "--root")
-    assert invoke(*words, "-x").exit_code == 0
-    tree = read_skeleton(tmp_path / "r.json")
-    assert (tree.n_loops, tree.n_components) == (0, 1)
-    assert tree.vertices[0].tolist() == list(tree.report.root)
-    assert tree.vertices[0, 0] == tree.vertices[:, 0].max()
-    assert invoke(*words, "up").exit_code == 2
-
-
 def test_warnings_json_and_quiet(invoke, scans, tmp_path):
     words = ("skeletonize", scans / "ball.ply", "-o", "s.ply")
     result = invoke(*words, "--json")
@@ -180,7 +169,6 @@ def test_a_large_scan_is_read_in_blocks(invoke, tmp_path, write_scan, monkeypatc
     assert 0 < facts["sampled"] < n
     np.testing.assert_allclose(read_skeleton("s.json").vertices, whole.vertices, atol=1e-9)
     assert len(read_tensor_cloud("l.ply").point.branch) == n
-    assert json.loads(invoke(*words, "--no-stream", "--json").stdout)["points"] == n
 
 
 # -------------------------------------------------------------------------------------------------- doubts about a run
