@@ -19,7 +19,6 @@ from .recipes import RECIPE_ENDINGS, load_recipe
 from .recipes.catalogue import named_pipeline
 from .ring_builder import RingBuilder
 from .skeleton import Skeleton
-from .state import Contraction
 
 PipelineChoice: TypeAlias = Pipeline[Skeleton] | str | os.PathLike[str] | Mapping[str, Any]
 """A pipeline, its name, the path of a recipe, or options for the default."""
@@ -98,13 +97,7 @@ def as_pipeline(pipeline: Pipeline[Skeleton] | Filter[Skeleton] | str | os.PathL
     return pipeline
 
 
-def remove_redundant_points(
-    cloud: Any,
-    *,
-    passes: int = 1,
-    rings: Filter[Contraction] | Pipeline[Contraction] | None = None,
-    reducer: LPRReducer | None = None,
-) -> tuple[Any, Any]:
+def remove_redundant_points(cloud: Any, *, passes: int = 1) -> tuple[Any, Any]:
     """Remove points that add little to the skeleton beyond their neighbours, by local point reduction.
 
     One pass contracts the points, merges redundant ones into their neighbours, and keeps about three fifths at their
@@ -115,10 +108,8 @@ def remove_redundant_points(
     cloud : open3d.geometry.PointCloud, open3d.t.geometry.PointCloud or (N, 3) array_like
         Not modified.
     passes : int
-        Solves, each with a merging pass after it. They cost as much as the contraction of a skeleton.
-    rings : RingBuilder, or a pipeline that ends with one, optional
-        How the neighbourhoods are made. By default points are neither set aside nor denoised.
-    reducer : LPRReducer, optional
+        Solves, each with a merging pass after it. They cost as much as the contraction of a skeleton. Points are
+        neither set aside nor denoised before them.
 
     Returns
     -------
@@ -146,10 +137,8 @@ def remove_redundant_points(
     name, tensor = open3d_class(cloud)
     if name == "TriangleMesh":
         raise InvalidCloudError("points cannot be removed from a mesh: make a cloud of its vertices first")
-    rings = RingBuilder() if rings is None else rings
-    reducer = LPRReducer() if reducer is None else reducer
-    contraction = Contractor(reducer=reducer, max_iterations=int(passes), stop=lambda iterations: None)
-    kept = np.sort((rings | contraction)(cloud).point_of_survivor)
+    contraction = Contractor(reducer=LPRReducer(), max_iterations=int(passes), stop=lambda iterations: None)
+    kept = np.sort((RingBuilder() | contraction)(cloud).point_of_survivor)
     if name == "PointCloud" and not tensor:
         return cloud.select_by_index(kept), kept.tolist()
     if tensor:

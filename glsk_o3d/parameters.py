@@ -110,7 +110,7 @@ RESERVED_WORDS = ("filter", "rule", UNWRITTEN, FROM)
 
 
 class Parameters:
-    """Mixin of frozen dataclasses whose fields are made by `parameter`: checked when made, and again when used."""
+    """Mixin of frozen dataclasses whose fields are made by `parameter`: they are checked when it is made."""
 
     kind: ClassVar[str] = "rule"
     """What a recipe calls it."""
@@ -160,12 +160,9 @@ def _plain(value: Any) -> Any:
 
 def shown(value: Any) -> str:
     """A value as messages show it: as in Python, but no pages of digits."""
-    if isinstance(value, Integral) and abs(int(value)) > LARGEST_WHOLE:
-        digits = round(math.log10(abs(int(value))))  # rounded; Python itself writes no number of more than 4300
-        return f"a number of {digits + (abs(int(value)) >= 10**digits)} digits"
     try:
         text = repr(value)
-    except ValueError:  # of a number too long to be written, inside something else
+    except ValueError:  # Python writes no number of more than 4300 digits
         text = f"a {type(value).__name__}"
     return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
 

@@ -50,13 +50,6 @@ def skeleton_outputs(
     ]
 
 
-def json_output(path: Path | None) -> Output:
-    """The file for all numbers of a command."""
-    from ..interop.atomic import write_json
-
-    return Output(path, (".json",), "report is JSON", lambda facts, path: write_json(path, facts))
-
-
 def check_outputs(outputs: Iterable[Output], *inputs: Path | None, needed: str | None = None) -> None:
     """Find out before computing whether files can be written.
 

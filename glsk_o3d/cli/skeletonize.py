@@ -128,16 +128,10 @@ def _shown(facts: Mapping[str, Any], skeleton: Skeleton) -> dict[str, Any]:
     from ..analysis.summary import ENDING_FACTS, ending, structure
 
     report, graph = skeleton.report, structure(skeleton)
-    hidden = {
-        *ENDING_FACTS,
-        "seconds",
-        "agreeing",
-        "loops_closed",
-    }  # most clouds have such loops, which are hardly ever true ones
+    hidden = {*ENDING_FACTS, "seconds", "agreeing", "loops_closed"}  # most clouds have such loops, hardly ever true ones
     hidden |= {"sampled"} if not report.is_sampled else set()
     hidden |= {"contracted"} if facts["contracted"] == facts["distinct"] else set()
-    told = {name: facts[name] for name in facts if name in graph or facts[name] or facts[name] is False}
-    shown = {name: value for name, value in told.items() if name not in hidden}
+    shown = {name: it for name, it in facts.items() if name not in hidden and (name in graph or it)}
     shown["uncertain"] = [f"{call}; if that is wrong: --set {call.otherwise}" for call in report.uncertain]
     if report.n_draws:
         agreeing = f"{report.n_agreeing} of {report.n_draws} have the same graph"

@@ -28,11 +28,6 @@ from .mesh_rings import clean_faces, mesh_rings
 BALL_RADII = (1.0, 2.0, 4.0)  # fitted: of the rolling balls, in spacings
 
 
-def spacing(points):
-    """Mean distance of the points to their six nearest neighbours, as many as a regular triangulation gives each."""
-    return float(nearest_neighbours(points, min(7, len(points)))[0][:, 1:].mean())
-
-
 def ball_pivoting(state):
     """Roll balls over the cloud of a state (Bernardini et al. 1999).
 
@@ -43,7 +38,9 @@ def ball_pivoting(state):
     edges = np.column_stack([state.rings.centres, state.rings.indices])
     cloud = to_point_cloud(state.cloud)
     cloud.normals = o3d.utility.Vector3dVector(orient_normals(state.cloud, state.normals, edges))
-    radii = o3d.utility.DoubleVector(spacing(state.cloud) * np.array(BALL_RADII))
+    # the mean distance to six neighbours, as many as a regular triangulation gives each point
+    spacing = nearest_neighbours(state.cloud, min(7, len(state.cloud)))[0][:, 1:].mean()
+    radii = o3d.utility.DoubleVector(spacing * np.array(BALL_RADII))
     mesh = o3d.geometry.TriangleMesh.create_from_point_cloud_ball_pivoting(cloud, radii)
     faces = clean_faces(state.cloud, np.asarray(mesh.triangles))
     if len(np.unique(faces)) < MIN_POINTS:

@@ -154,18 +154,6 @@ def test_a_window_shows_a_skeleton_or_a_scan_and_its_labels_in_colour(invoke, sc
     assert (colours[1] == colours[2]).all()
 
 
-def test_points_are_coloured_by_the_attribute_that_is_asked_for(invoke, refused, tmp_path, y, shown):
-    (tmp_path / "c.csv").write_text("x,y,z,label,angle\n0,0,0,1,0\n0,0,1,2,5\n0,1,1,2,9\n1,1,1,-1,nan\n")
-    assert invoke("view", "c.csv", "--color", "angle").exit_code == 0
-    colours = np.asarray(shown.pop()[1].colors)
-    assert colours[0, 2] > colours[0, 0]  # dark blue
-    assert colours[2, 0] > 0.9 > colours[2, 2]  # yellow
-    assert np.ptp(colours[3]) < 0.1 < np.ptp(colours[1])  # grey is what is no number
-    assert "did you mean 'label'" in refused(2, "view", "c.csv", "--color", "lable")
-    assert "--color is for scans" in refused(2, "view", y, "--color", "branch")
-    assert "--color is for the window" in refused(2, "view", "c.csv", "--color", "angle", "--preview", "p.png")
-
-
 def test_files_instead_of_a_window(invoke, scans, shown, tmp_path, y):
     for file in (tmp_path / y, scans / "nan.ply"):
         result = invoke("view", file, "--report", "r.html", "--preview", "p.png")

@@ -41,7 +41,6 @@ TABLE = """
     1 evaluate y.ply SCANS/ring.ply --truth none.npz       | none.npz: not a valid truth: the truth has no nodes
     1 evaluate dot.ply SCANS/ring.ply                      | dot.ply: the skeleton has no edge with a length
     1 evaluate y.ply few.xyz                               | few.xyz: no part of the skeleton has 6 points around it
-    2 evaluate y.ply SCANS/ring.ply -o r.txt               | r.txt: the report is JSON and its name ends in .json
     1 crosscheck SCANS/nan.ply                             | nan.ply: 2 of 1000 points
     1 info SCANS/empty.ply                                 | empty.ply: the file is empty
     1 info none.ply                                        | none.ply: no such file
