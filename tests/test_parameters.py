@@ -100,13 +100,6 @@ def test_parameters_of_a_part_are_checked_too():
         (RingBuilder() | Contractor(reducer=LPRReducer(phi=0)))(POINTS)
 
 
-@pytest.mark.parametrize(
-    "made", [cls() for cls in DESCRIBED] + [RingBuilder(k=17), Sampler(drop_invalid=True)], ids=repr
-)
-def test_repr_rebuilds_the_filter(made):
-    assert eval(repr(made), PUBLIC) == made
-
-
 @pytest.mark.parametrize(("length", "expected"), [("2%", 1), (" 0.5 % ", 0.25), ("1e1%", 5), (".5%", 0.25), (7, 7)])
 def test_lengths(length, expected):
     assert resolve_length(length, 50.0) == pytest.approx(expected, rel=1e-15)

@@ -96,12 +96,6 @@ class TestCommands:
         assert [line for line in page.read_text().splitlines() if line.startswith("|")] == lines
         assert "old" not in page.read_text()
 
-    def test_scans(self, call, parts, monkeypatch):
-        (found,) = parts.figures.objects(None, True, "tube", [256])
-        monkeypatch.setattr(parts.figures, "clouds", lambda folders, sizes: [("shapes", *found)])
-        printed = call("scans", "--sizes", 256, "--jobs", 0, "--repeat", 1, "--markdown")
-        assert printed.count("| shapes | 256 | ") == 2
-
     def test_huge(self, call, tmp_path):
         pytest.importorskip("laspy")
         out = tmp_path / "out.json"

@@ -128,7 +128,7 @@ def _shown(facts: Mapping[str, Any], skeleton: Skeleton) -> dict[str, Any]:
     from ..analysis.summary import ENDING_FACTS, ending, structure
 
     report, graph = skeleton.report, structure(skeleton)
-    hidden = {*ENDING_FACTS, "seconds", "agreeing", "loops_closed"}  # most clouds have such loops, hardly ever true ones
+    hidden = {*ENDING_FACTS, "seconds", "agreeing", "loops_closed"}  # hardly ever true loops
     hidden |= {"sampled"} if not report.is_sampled else set()
     hidden |= {"contracted"} if facts["contracted"] == facts["distinct"] else set()
     shown = {name: it for name, it in facts.items() if name not in hidden and (name in graph or it)}

@@ -36,14 +36,6 @@ def test_branches_table_file_and_json_agree(invoke, tmp_path, y):
     assert invoke("branches", y, "-q").stdout == ""
 
 
-@pytest.mark.parametrize(
-    ("root", "start"), [("2", 2), ("-0.3,0,0.4", 2), ("0.4, 0, 1", 3), ("z", 1), ("x", 2), ("-x", 3)]
-)
-def test_a_root_of_branches(invoke, y, root, start):
-    facts = json.loads(invoke("branches", y, "--json", "--root", root).stdout)
-    assert [row["start"] for row in facts["branches"] if row["level"] == 0] == [start]
-
-
 def test_tree_lines_file_and_json_agree(invoke, tmp_path, y):
     result = invoke("tree", y, "-o", "c.csv", "--root", "0,0,-0.5")
     assert (result.exit_code, result.stderr) == (0, "")

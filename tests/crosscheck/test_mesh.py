@@ -141,15 +141,6 @@ def test_points_without_a_triangle_go_to_the_nearest_with_one():
     assert skeleton.n_components == 1
 
 
-def test_the_skeleton_of_a_torus_is_its_axis():
-    state, faces = meshed(torus(2000).points)
-    skeleton = mesh_skeleton(state, faces, pipelines.default())
-    assert (skeleton.n_components, skeleton.n_loops) == (1, 1)
-    ring = torus(10)
-    assert np.abs(np.linalg.norm(skeleton.vertices[:, :2], axis=1) - np.linalg.norm(ring.nodes[0])).max() < 0.01
-    assert np.abs(skeleton.vertices[:, 2]).max() < 0.01
-
-
 # ------------------------------------------------------------------------------------------------------ orientation
 
 
