@@ -36,7 +36,7 @@ def test_without_a_truth(invoke, scans, ring, moved):
     assert report["truth"] is report["comparison"] is None
     words = " ".join(run.stdout.split())
     assert words.startswith(f"assessment centredness {report['assessment']['centredness']:.6g} boundedness ")
-    assert " loops 1 wide loops 1 " in words
+    assert words.endswith(" loops 1 wide loops 1")
     assert invoke("evaluate", "s.json", scans / "ring.ply", "--quiet").output == ""
 
 
