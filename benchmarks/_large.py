@@ -170,7 +170,7 @@ def measure_huge(endings: list[str], labelled: list[str], n: int, against: int, 
             if not path.exists():
                 write_huge(path, n)
             size, skeleton = path.stat().st_size / GB, path.with_suffix(".npz")
-            facts = spent(COMMAND, path, "skeletonize", path, "--stream", "-o", skeleton)
+            facts = spent(COMMAND, path, "skeletonize", path, "-o", skeleton)
             found = read_skeleton(skeleton)
             mean, most = apart(found, base, diagonal)
             row = dict(measure="huge", n=n)

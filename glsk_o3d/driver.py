@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypedDict, overload
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from .contractor import Contractor, Reducer
+from .contractor import Contractor
 from .errors import InvalidCloudError, InvalidParameterError
-from .interop.clouds import SearchParam, open3d_class
+from .interop.clouds import open3d_class
 from .interop.packages import import_open3d
 from .lpr_reducer import LPRReducer
 from .parameters import check_number
@@ -19,76 +19,11 @@ from .recipes import RECIPE_ENDINGS, load_recipe
 from .recipes.catalogue import named_pipeline
 from .ring_builder import RingBuilder
 from .skeleton import Skeleton
-from .state import Contraction
-from .stopping import StopRule
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack  # which type checkers bring
-
 
 PipelineChoice: TypeAlias = Pipeline[Skeleton] | str | os.PathLike[str] | Mapping[str, Any]
 """A pipeline, its name, the path of a recipe, or options for the default."""
 
 
-class Options(TypedDict, total=False):
-    """The options of the filters in the named pipelines that `skeletonize` takes by their names alone."""
-
-    size: int | Literal["auto", "all"]
-    frame: Literal["spread", "box"]
-    drop_invalid: bool
-    outlier_factor: float
-    denoise: int
-    around: float
-    thin_to: int | Literal["auto", "all"]
-    k: int | Literal["auto", "published"] | SearchParam
-    reducer: Reducer | None
-    stop: StopRule
-    max_iterations: int
-    initial_contraction: float
-    amplification: float
-    max_contraction: float
-    min_attraction: float
-    line_hold: float
-    keep_last: bool
-    retries: int
-    max_attraction: float
-    phi: float
-    conserve_mass: bool
-    mend_rings: bool
-    order: Literal["cheapest", "index"]
-    threshold: float
-    min_iterations: int
-    thickness: float
-    links: Literal["all", "nearest"]
-    collapse: Literal["length", "degree"]
-    handle: float
-    air: float
-    bridge: float
-    limb: float
-    spacing: float
-    recentre: int
-    surface: float
-    root: str | Any
-
-
-@overload
-def skeletonize(
-    cloud: Any,
-    pipeline: Literal["default", "tree", "wen2024", "cao2010"] = ...,
-    *,
-    on_iteration: OnIteration | None = ...,
-    on_state: OnState | None = ...,
-    **options: Unpack[Options],
-) -> Skeleton: ...
-@overload
-def skeletonize(
-    cloud: Any,
-    pipeline: PipelineChoice,
-    *,
-    on_iteration: OnIteration | None = ...,
-    on_state: OnState | None = ...,
-    **options: Any,
-) -> Skeleton: ...
 def skeletonize(
     cloud: Any,
     pipeline: PipelineChoice = "default",
@@ -110,8 +45,8 @@ def skeletonize(
     on_state : callable, optional
         Called before `on_iteration` with the Contraction after each solve, such as a `ContractionRecorder`.
     **options
-        Parameters of the filters, by name; type checkers know them. If more than one filter has the name, give a
-        mapping, ``{"Connector.radius": "2%"}``: as `pipeline` for ``"default"``, else to `Pipeline.with_options`.
+        Parameters of the filters, by name. If more than one filter has the name, give a mapping,
+        ``{"Connector.radius": "2%"}``: as `pipeline` for ``"default"``, else to `Pipeline.with_options`.
 
     Returns
     -------
@@ -162,13 +97,7 @@ def as_pipeline(pipeline: Pipeline[Skeleton] | Filter[Skeleton] | str | os.PathL
     return pipeline
 
 
-def remove_redundant_points(
-    cloud: Any,
-    *,
-    passes: int = 1,
-    rings: Filter[Contraction] | Pipeline[Contraction] | None = None,
-    reducer: LPRReducer | None = None,
-) -> tuple[Any, Any]:
+def remove_redundant_points(cloud: Any, *, passes: int = 1) -> tuple[Any, Any]:
     """Remove points that add little to the skeleton beyond their neighbours, by local point reduction.
 
     One pass contracts the points, merges redundant ones into their neighbours, and keeps about three fifths at their
@@ -179,10 +108,8 @@ def remove_redundant_points(
     cloud : open3d.geometry.PointCloud, open3d.t.geometry.PointCloud or (N, 3) array_like
         Not modified.
     passes : int
-        Solves, each with a merging pass after it. They cost as much as the contraction of a skeleton.
-    rings : RingBuilder, or a pipeline that ends with one, optional
-        How the neighbourhoods are made. By default points are neither set aside nor denoised.
-    reducer : LPRReducer, optional
+        Solves, each with a merging pass after it. They cost as much as the contraction of a skeleton. Points are
+        neither set aside nor denoised before them.
 
     Returns
     -------
@@ -210,10 +137,8 @@ def remove_redundant_points(
     name, tensor = open3d_class(cloud)
     if name == "TriangleMesh":
         raise InvalidCloudError("points cannot be removed from a mesh: make a cloud of its vertices first")
-    rings = RingBuilder() if rings is None else rings
-    reducer = LPRReducer() if reducer is None else reducer
-    contraction = Contractor(reducer=reducer, max_iterations=int(passes), stop=lambda iterations: None)
-    kept = np.sort((rings | contraction)(cloud).point_of_survivor)
+    contraction = Contractor(reducer=LPRReducer(), max_iterations=int(passes), stop=lambda iterations: None)
+    kept = np.sort((RingBuilder() | contraction)(cloud).point_of_survivor)
     if name == "PointCloud" and not tensor:
         return cloud.select_by_index(kept), kept.tolist()
     if tensor:

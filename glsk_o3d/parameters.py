@@ -4,6 +4,7 @@ import dataclasses
 import inspect
 import math
 import re
+from collections.abc import Mapping
 from numbers import Integral, Rational, Real
 from typing import Any, ClassVar, TypeVar
 
@@ -52,6 +53,28 @@ def parameter(
     return dataclasses.field(default=default, metadata=facts)
 
 
+def allowed_values(facts: Mapping[str, Any]) -> str:
+    """Type, unit and limits of a parameter in words, such as ``"'auto' or int [points], at least 4"``.
+
+    Parameters
+    ----------
+    facts : mapping
+        The metadata of a field made by `parameter`.
+
+    Returns
+    -------
+    str
+    """
+    kinds = [repr(choice) for choice in facts["choices"]]
+    kinds += [facts["type"].replace("?", " or None")] * (facts["type"] != "choice")
+    words = [" or ".join(kinds) + f" [{facts['unit']}]" * (facts["unit"] != "-")]
+    if facts["low"] is not None:
+        words.append(f"{'above' if facts['open_low'] else 'at least'} {facts['low']:g}")
+    if facts["high"] is not None:
+        words.append(f"at most {facts['high']:g}")
+    return ", ".join(words)
+
+
 def documented(cls: _Class) -> _Class:
     """Class decorator: append the numpydoc "Parameters" section made from the fields' own facts.
 
@@ -64,11 +87,8 @@ def documented(cls: _Class) -> _Class:
     """
     lines = []
     for field in dataclasses.fields(cls):
-        facts = field.metadata
-        words = [repr(choice) for choice in facts["choices"]]
-        kind = " or ".join(words + [facts["type"].replace("?", " or None")] * (facts["type"] != "choice"))
-        unit = "" if facts["unit"] == "-" else f" [{facts['unit']}]"
-        lines += [f"{field.name} : {kind}{unit}, default {field.default!r}", f"    {facts['doc']}"]
+        words, doc = allowed_values(field.metadata), field.metadata["doc"]
+        lines += [f"{field.name} : {words}, default {field.default!r}", f"    {doc}"]
     if lines:
         text = inspect.cleandoc(cls.__doc__ or "")
         if is_own(cls):
@@ -90,7 +110,7 @@ RESERVED_WORDS = ("filter", "rule", UNWRITTEN, FROM)
 
 
 class Parameters:
-    """Mixin of frozen dataclasses whose fields are made by `parameter`: checked when made, and again when used."""
+    """Mixin of frozen dataclasses whose fields are made by `parameter`: they are checked when it is made."""
 
     kind: ClassVar[str] = "rule"
     """What a recipe calls it."""
@@ -140,12 +160,9 @@ def _plain(value: Any) -> Any:
 
 def shown(value: Any) -> str:
     """A value as messages show it: as in Python, but no pages of digits."""
-    if isinstance(value, Integral) and abs(int(value)) > LARGEST_WHOLE:
-        digits = round(math.log10(abs(int(value))))  # rounded; Python itself writes no number of more than 4300
-        return f"a number of {digits + (abs(int(value)) >= 10**digits)} digits"
     try:
         text = repr(value)
-    except ValueError:  # of a number too long to be written, inside something else
+    except ValueError:  # Python writes no number of more than 4300 digits
         text = f"a {type(value).__name__}"
     return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
 

@@ -176,7 +176,6 @@ class Pipeline(Generic[Produced]):
         Skeleton, Contraction or cloud
             Whatever the last filter gives.
         """
-        self.check()
         data, report = cloud, cloud.report if isinstance(cloud, FLOWS[1:]) else Report()
         told = report.warnings
         watch = _watch(on_iteration, on_state)
@@ -194,11 +193,6 @@ class Pipeline(Generic[Produced]):
                 data = dataclasses.replace(data, report=report)
         warn(message for message in report.warnings if message not in told)
         return data
-
-    def check(self) -> None:
-        """Raise InvalidParameterError if a parameter of a stage is wrong."""
-        for stage in self.stages:
-            stage.check()
 
     def check_complete(self) -> None:
         """Raise InvalidParameterError unless the pipeline leads from a cloud to a skeleton."""
@@ -220,7 +214,6 @@ class Pipeline(Generic[Produced]):
         Returns
         -------
         Pipeline
-            Checked.
 
         Raises
         ------
@@ -245,7 +238,6 @@ class Pipeline(Generic[Produced]):
                 raise InvalidParameterError(f"{names[cls, field.name]} and {name} are the same option: give it once")
             names[cls, field.name] = name
             pipeline = _changed(pipeline, cls, field.name, value)
-        pipeline.check()
         return pipeline
 
     def class_of_option(self, name: str) -> tuple[type[Parameters], dataclasses.Field[Any]]:

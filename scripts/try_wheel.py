@@ -21,10 +21,9 @@ TABLE = "x,y,z,tree\n" + "".join(f"{x},{y},{z},{x % 2}\n" for x in range(40) for
 COMMANDS = """\
 demo
 filters
-info
 info demo/cloud.ply
-info demo/skeleton.json
 skeletonize demo/cloud.ply -o s.json -o s.vtp -o s.ply --where z>-9
+info s.json
 skeletonize demo/cloud.ply --pipeline tree -o t.json
 skeletonize demo/cloud.ply -o r.json --preview r.png --report r.html
 batch demo/cloud.ply -o many

@@ -74,11 +74,6 @@ def test_points_of_a_noisy_cylinder_come_nearer_to_it():
     assert np.mean(radius) == pytest.approx(1, abs=0.05)
 
 
-def test_clean_cylinder_does_not_move():
-    points = cylinder(0.01)
-    assert subspace_mean_shift(points, noise_of(points), 4) is points
-
-
 @pytest.mark.parametrize("share", [1, 0.25])
 def test_one_pass_by_its_definition(share):
     """A share of the way to the mean of the neighbours in a Gaussian, but for that along their main direction."""
@@ -92,16 +87,6 @@ def test_one_pass_by_its_definition(share):
         way = np.average(near, axis=0, weights=weight) - x
         along = np.linalg.eigh(np.cov(near, rowvar=False, aweights=weight))[1][:, 2]
         np.testing.assert_allclose(after, x + share * (way - along * (along @ way)), atol=1e-10)
-
-
-@pytest.mark.parametrize(("turn", "scale", "shift"), [(TURN, 1, [5, 6, 7]), (TURN, 1e-9, 0)])
-def test_goes_with_the_cloud(turn, scale, shift):
-    points = cylinder(0.2)
-    noise = noise_of(points)
-    there = scale * points @ turn + shift
-    np.testing.assert_allclose(noise_of(there), noise, atol=1e-9)
-    moved = (subspace_mean_shift(there, noise, 3) - shift) / scale
-    np.testing.assert_allclose(moved, subspace_mean_shift(points, noise, 3) @ turn, atol=1e-8)
 
 
 # ---- the filter

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 
 import glsk_o3d as glsk
 from glsk_o3d import InvalidCloudError, SkeletonWarning, pipelines, samples, skeletonize
@@ -229,34 +228,8 @@ def test_duplicates_change_nothing_but_the_centres(name):
     np.testing.assert_array_equal(doubled.vertex_of_point, np.repeat(single.vertex_of_point, 2))
 
 
-def test_duplicates_count_as_support_in_the_refiner():
-    """Subdividing and centring count every copy of a point; the axis stays where it is."""
-    single, doubled = run(TORUS, "default"), run(SOUND["every point twice"], "default")
-    assert doubled.n_loops == single.n_loops == 1
-    apart, _ = cKDTree(single.vertices).query(doubled.vertices)
-    assert apart.max() < single.edge_lengths.max()
-
-
 @pytest.mark.parametrize("case", PLAIN)
 def test_layout_and_type_do_not_matter(case):
     given, plain = run(SOUND[case], "default"), run(np.array(SOUND[case], float), "default")
     np.testing.assert_array_equal(given.vertices, plain.vertices)
     np.testing.assert_array_equal(given.edges, plain.edges)
-
-
-def test_open3d_clouds_are_their_points():
-    o3d = pytest.importorskip("open3d")
-    expected = run(Y, "default")
-    legacy = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(Y))
-    mesh = o3d.geometry.TriangleMesh(legacy.points, o3d.utility.Vector3iVector([[0, 1, 2]]))
-    double = o3d.t.geometry.PointCloud(o3d.core.Tensor(Y))
-    for cloud in (legacy, mesh, double, o3d.core.Tensor(Y), legacy.points):
-        skeleton = run(cloud, "default")
-        np.testing.assert_array_equal(skeleton.vertices, expected.vertices)
-        np.testing.assert_array_equal(skeleton.edges, expected.edges)
-    single = o3d.t.geometry.PointCloud(o3d.core.Tensor(Y.astype(np.float32)))
-    np.testing.assert_array_equal(run(single, "default").vertices, run(SOUND["float32"], "default").vertices)
-    np.testing.assert_array_equal(np.asarray(legacy.points), Y)
-    for empty in (o3d.geometry.PointCloud(), o3d.t.geometry.PointCloud(), o3d.geometry.TriangleMesh()):
-        with pytest.raises(InvalidCloudError):
-            run(empty, "default")

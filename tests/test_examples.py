@@ -57,19 +57,3 @@ def test_open3d_pipeline(root, tmp_path, monkeypatch, capsys, api, dtype):
         assert len(o3d.io.read_line_set(str(folder / f"{i}_lines.ply")).colors) == len(skeleton.edges)
         assert o3d.io.read_triangle_mesh(str(folder / f"{i}_tubes.ply")).has_vertex_colors()
     assert shapes == {(1, 0), (0, 3)}
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["none.ply", "out"], "error: none.ply: no such file"),
-        (["scene.ply", "out", "--least", "9999"], "error: scene.ply: no object found: 0 of at least 9999 points"),
-    ],
-)
-def test_open3d_pipeline_says_what_is_wrong(root, tmp_path, monkeypatch, words, said):
-    monkeypatch.chdir(tmp_path)
-    write_scene(tmp_path / "scene.ply", "f8")
-    monkeypatch.setattr(sys, "argv", ["open3d_pipeline.py", *words])
-    with pytest.raises(SystemExit, match=said):
-        runpy.run_path(str(root / "examples" / "open3d_pipeline.py"), run_name="__main__")
-    assert [path.name for path in tmp_path.iterdir()] == ["scene.ply"]

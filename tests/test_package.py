@@ -86,8 +86,3 @@ def test_there_is_one_version(root):
 def test_is_typed(root):
     for package in ("glsk_o3d", "benchmarks/src/glsk_bench"):
         assert (root / package / "py.typed").is_file()
-
-
-def test_all_names_are_there():
-    missing = [name for name in glsk_o3d.__all__ if not hasattr(glsk_o3d, name)]
-    assert not missing

@@ -157,14 +157,6 @@ def test_incomplete_pipelines_are_refused(incomplete):
         skeletonize(POINTS, incomplete)
 
 
-def test_parameters_of_all_stages_are_checked_before_any_work():
-    late, told = RingBuilder() | Contractor() | Connector() | Refiner(), []
-    object.__setattr__(late.stages[-1], "recentre", -1)  # as a plugin may that has its own __post_init__
-    with pytest.raises(InvalidParameterError, match=r"Refiner\.recentre"):
-        late(POINTS, on_iteration=told.append)
-    assert told == []
-
-
 # ---- other options
 
 

@@ -7,7 +7,6 @@ import re
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-import numpy as np
 import pytest
 
 from glsk_o3d import (
@@ -139,9 +138,3 @@ def test_decisions_in_words():
     ]
     other = [dataclasses.replace(it, changed=not it.changed).outcome for it in JUDGEMENTS]
     assert other == ["loop closed", "branch kept", "gap bridged", "limb kept"]
-
-
-def test_names_the_versions():
-    versions = Report().versions
-    assert versions["numpy"] == np.__version__
-    assert set(versions) >= {"glsk-o3d", "numpy", "scipy", "open3d"}

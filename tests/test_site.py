@@ -17,16 +17,6 @@ BROKEN = """[...document.querySelectorAll("article :is(td, th)")].flatMap((cell)
     return broken;
 })"""
 """Words in tables that go over more than one line."""
-INTERVALS = """[...document.querySelectorAll("article td")].flatMap((cell) => {
-    const found = cell.innerText.match(/\\[[-+.\\d]+,\\s[-+.\\d]+\\]/);
-    if (!found || cell.childNodes.length != 1 || cell.querySelector("p *")) return [];
-    const text = document.createTreeWalker(cell, NodeFilter.SHOW_TEXT).nextNode(), range = document.createRange();
-    const start = text.data.indexOf("[");
-    range.setStart(text, start);
-    range.setEnd(text, text.data.indexOf("]", start) + 1);
-    return [new Set([...range.getClientRects()].map((box) => Math.round(box.top))).size];
-})"""
-"""How many lines each interval in a table takes."""
 SEARCHES = {
     "ring builder": "docs/filters/ring_builder.html",
     "trees": "docs/trees.html",
@@ -89,13 +79,6 @@ def test_no_page_is_wider_than_a_phone_and_no_word_of_a_table_is_broken(site, vi
     assert broken == {}
 
 
-@pytest.mark.parametrize("width", [1400, 390])
-def test_intervals_in_tables_stay_on_one_line(visit, width):
-    lines = visit("docs/comparison.html", width).evaluate(INTERVALS)
-    assert len(lines) > 100
-    assert {*lines} == {1}
-
-
 def test_equations_are_set_in_the_font_that_comes_with_the_site(visit):
     tab = visit("docs/filters/contractor.html")
     tab.evaluate("document.fonts.ready")
@@ -137,44 +120,3 @@ def test_what_is_internal_cannot_be_searched_for(site):
     assert len(names) > 100
     assert [name for name in names if re.search(r"(^|\.)_", name)] == []
     assert not any(re.search(r"[(. ]_\w", entry) for entry in index["indexentries"])
-
-
-@pytest.mark.parametrize(
-    ("page", "title"),
-    [
-        ("docs/trees.html", "Trees and plants"),
-        ("docs/generated/api/glsk_o3d.analysis.branch_table.html", "branch_table"),
-    ],
-)
-def test_the_menu_shows_where_one_is(page, title, visit):
-    tab = visit(page)
-    here = tab.locator(".sidebar-tree [aria-current=page]")
-    assert here.all_inner_texts() == [title]
-    assert here.is_visible()
-    assert tab.locator(".sidebar-tree details[open]").count() == 1
-    assert tab.locator(".sidebar-tree a:visible").count() < 50
-    assert tab.locator(".sidebar-tree summary:visible").count() > 4
-
-
-def test_pictures_on_white_do_not_dazzle_in_the_dark(visit):
-    changed = "(picture) => getComputedStyle(picture).filter"
-    for page, pictures in (("docs/index.html", "article img"), ("docs/method.html", "article img")):
-        assert visit(page).locator(pictures).first.evaluate(changed) == "none"
-        shown = visit(page, scheme="dark").locator(pictures).evaluate_all(f"(all) => all.map({changed})")
-        assert shown
-        assert "none" not in shown
-
-
-@pytest.mark.parametrize("width", [390, 1400])
-def test_the_first_page_leads_on(width, visit):
-    tab = visit("docs/index.html", width)
-    cards = tab.locator("article td img")
-    assert cards.count() == 3
-    boxes = [cards.nth(number).bounding_box() for number in range(3)]
-    places = [box["x" if width == 390 else "y"] for box in boxes]
-    assert max(places) - min(places) < 2  # below or beside each other
-    assert min(box["width"] for box in boxes) > 180
-    assert tab.locator("article td a:has(img)").evaluate_all("(links) => links.map((each) => each.href)") == [
-        (tab.evaluate("document.baseURI").rpartition("/")[0] + f"/generated/gallery/plot_{name}.html")
-        for name in ("14_grasps", "17_plot_of_trees", "09_segmentation")
-    ]

@@ -1,7 +1,6 @@
 """The speed benchmark: its stopwatch, its arithmetic, its table of stages, and its commands on tiny clouds."""
 
 import json
-import math
 from itertools import count
 
 import numpy as np
@@ -39,13 +38,6 @@ class TestStopwatch:
 
 
 class TestArithmetic:
-    def test_growth_of_powers(self, parts):
-        sizes = [256, 1024, 4096, 16384, 65536, 262144]
-        assert parts.stages.growth(sizes, [3e-6 * n**1.7 for n in sizes]) == pytest.approx(1.7)
-        bent = [n**0.5 if n < 4096 else n**1.25 for n in sizes]
-        assert parts.stages.growth(sizes, bent, *parts.stages.MIDDLE) == pytest.approx(1.25)
-        assert math.isnan(parts.stages.growth([256, 4096], [0, 2]))
-
     def test_distance_of_curves(self, parts):
         ends = np.array([[0.0, 0, 0], [10, 0, 0]])
         curve, beside = (Skeleton(ends + [0, y, 0], np.array([[0, 1]]), np.ones(2), (), (), ()) for y in (0, 1))
@@ -95,12 +87,6 @@ class TestCommands:
         assert len(lines) == 4
         assert [line for line in page.read_text().splitlines() if line.startswith("|")] == lines
         assert "old" not in page.read_text()
-
-    def test_scans(self, call, parts, monkeypatch):
-        (found,) = parts.figures.objects(None, True, "tube", [256])
-        monkeypatch.setattr(parts.figures, "clouds", lambda folders, sizes: [("shapes", *found)])
-        printed = call("scans", "--sizes", 256, "--jobs", 0, "--repeat", 1, "--markdown")
-        assert printed.count("| shapes | 256 | ") == 2
 
     def test_huge(self, call, tmp_path):
         pytest.importorskip("laspy")

@@ -50,8 +50,3 @@ def test_ring_size_ratio(rule, ratios, stops_after):
     history = records(ring_ratio=ratios)
     stops = [i + 1 for i in range(len(history)) if rule(history[: i + 1]) is not None]
     assert stops[:1] == ([] if stops_after is None else [stops_after])
-
-
-def test_reasons_give_the_figures():
-    assert "De = 0.0123 < 0.03" in ExplainedScore()(records(explained_change=[1, 1, 1, 0.0123]))
-    assert "0.0042 < 0.01" in RingSizeRatio()(records(ring_ratio=[0.5, 0.4958]))

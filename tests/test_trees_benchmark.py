@@ -120,12 +120,3 @@ class TestCommands:
         assert row["height"][1] == 4
         assert "scan" in out
         call("models", tmp_path / "scan.ply", code=2)
-
-    def test_large(self, parts, tmp_path):
-        np.save(tmp_path / "scan.npy", samples.tree(2000, forks=2, cameras=parts.trees.CAMERAS).points)
-        facts = dict(n=2000, pipeline="default, untraced")
-        ((_, header, (line, failed)),) = parts.trees.large_tables(
-            [facts | parts.trees.once(tmp_path / "scan.npy", facts["pipeline"]), facts | dict(failure="ValueError: no")]
-        )
-        assert dict(zip(header, line, strict=True))["traced"] == "0"
-        assert failed == ["default, untraced", "2000", *"-" * 7, "ValueError: no"]

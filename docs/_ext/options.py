@@ -7,7 +7,7 @@ from docutils.parsers.rst import Directive
 from sphinx.addnodes import index
 
 from glsk_o3d import pipelines
-from glsk_o3d.cli.filters import limits
+from glsk_o3d.parameters import allowed_values
 from glsk_o3d.pipeline import parts
 from glsk_o3d.recipes.catalogue import BUILTIN
 
@@ -25,17 +25,6 @@ def published(cls, name, default):
             if type(part) is cls and plain(getattr(part, name)) != plain(default):
                 said.append(f"{plain(getattr(part, name))} in {pipeline.__name__}")
     return said
-
-
-def kind(facts):
-    """Type, unit and limits of a parameter in words."""
-    unit = "no unit" if facts["unit"] == "-" else facts["unit"]
-    type = "" if facts["type"] == "choice" else facts["type"].replace("stop", "stopping rule").replace("?", " or None")
-    return ", ".join(filter(None, [type, limits(facts), unit if facts["type"] in MEASURED else ""]))
-
-
-MEASURED = ("int", "float", "length", "length?")
-"""Types that have a unit; the others are words and objects."""
 
 
 class Options(Directive):
@@ -58,7 +47,7 @@ class Options(Directive):
             place = f"{cls.__name__}.{field.name}"
             entry = index(entries=[("single", field.name, place, "main", None)])  # whom the search leads here
             term = nodes.term("", "", entry, nodes.literal(text=field.name), nodes.Text("  "))
-            words = "; ".join([kind(facts), *default, *published(cls, field.name, field.default)])
+            words = "; ".join([allowed_values(facts), *default, *published(cls, field.name, field.default)])
             term += nodes.inline(text=words, classes=["kind"])
             text, _ = self.state.inline_text(facts["doc"], self.lineno)
             touch, _ = self.state.inline_text(notes[field.name], self.lineno)

@@ -3,7 +3,7 @@
 import json
 import math
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -37,14 +37,14 @@ def echo(text: str = "", *, err: bool = False) -> None:
 
 def say(kind: str, message: str) -> None:
     """Print one line to stderr, yellow for a "warning" and red for an "error"; other kinds are "info" and "debug"."""
-    style = {"error": "red", "warning": "yellow"}.get(kind, "dim")
-    prefix = f"glsk: {kind}: " if kind in ("error", "warning") else "glsk: "
-    console(stderr=True).print(prefix + visible(" ".join(message.split())), style=style, soft_wrap=True)
+    color = {"error": "red", "warning": "yellow"}.get(kind)
+    prefix = f"glsk: {kind}: " if color else "glsk: "
+    typer.secho(prefix + visible(" ".join(message.split())), err=True, fg=color, dim=not color)
 
 
 def heading(text: str) -> None:
     """Print a bold line on stdout."""
-    console().print(visible(text), style="bold", soft_wrap=True)
+    typer.secho(visible(text), bold=True)
 
 
 def console(*, stderr: bool = False) -> Any:
@@ -79,10 +79,8 @@ def progress(*, remaining: bool = False) -> Iterator[Callable[..., None]]:
         yield update
 
 
-def print_table(
-    rows: Iterable[Sequence[str]], heads: Sequence[str] = (), *, left: Collection[int] = (), wrap: bool = False
-) -> None:
-    """Print rows of words below each other, those in the columns `left` to the left, all so where there are no `heads`.
+def print_table(rows: Iterable[Sequence[str]], heads: Sequence[str] = (), *, wrap: bool = False) -> None:
+    """Print rows of words below each other, to the left, or to the right below `heads`.
 
     The last column is broken to the width of the terminal, or of 80 where there is none, if `wrap` says so.
     """
@@ -94,7 +92,7 @@ def print_table(
     style: Any = dict(box=SIMPLE_HEAD if heads else None, show_header=bool(heads), pad_edge=False, header_style="")
     table = Table(**style, padding=(0, 1 if heads else 2, 0, 0))
     for i, head in enumerate(named):
-        table.add_column(head, justify="right" if heads and i not in left else "left", no_wrap=i < len(named) - 1)
+        table.add_column(head, justify="right" if heads else "left", no_wrap=i < len(named) - 1)
     for row in rows:
         table.add_row(*row)
     out = console()

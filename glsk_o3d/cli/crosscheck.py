@@ -5,15 +5,14 @@ from typing import Annotated, Any
 
 from ..errors import InvalidCloudError
 from .console import print_rows, progress
-from .options import DropInvalid, Numbers, PipelineName, ScanFile, option
-from .outputs import Output, check_outputs, json_output, tell, write_each
+from .options import DropInvalid, PipelineName, ScanFile, option
+from .outputs import Output, check_outputs, tell, write_each
 
 
 def crosscheck(
     scan: ScanFile,
-    output: Numbers = None,
     labelled: Annotated[
-        Path | None, option("CLOUD", "The points with their angles, as ply: 'glsk view CLOUD --color angle'.")
+        Path | None, option("CLOUD", "The points with their angles, as ply: 'glsk view CLOUD' shows them in colours.")
     ] = None,
     pipeline: PipelineName = "default",
     drop_invalid: DropInvalid = False,
@@ -30,17 +29,17 @@ def crosscheck(
     from ..viewing.figures import printable
     from .overrides import choose
 
-    numbers, angles = json_output(output), Output(labelled, (".ply",), "file is a cloud with angles", _save_angles)
-    check_outputs([numbers, angles], scan)
+    angles = Output(labelled, (".ply",), "file is a cloud with angles", _save_angles)
+    check_outputs([angles], scan)
     chosen = choose(pipeline, drop_invalid=drop_invalid)
     with progress() as update:
         update(f"reading {scan.name}")
         cloud = read_cloud(scan)
         update("comparing with a mesh")
         check = cross_check(cloud, pipeline=chosen)
-        facts = {"scan": printable(scan), **check.to_dict()}
-        files = write_each([numbers], facts) | write_each([angles], check)
-    told = {"because": facts["reasons"], "which is": MEANINGS[check.verdict], "surface": check.surface}
+        files = write_each([angles], check)
+    facts = {"scan": printable(scan), **check.to_dict()}
+    told = {"because": facts["reasons"], "which is": MEANINGS[check.verdict]}
     told |= {name: facts[name] for name in ("points", "mesh", "rows", "skeletons")}
     tell(facts, lambda: print_rows(told, title=f"{scan}: {check.verdict}"), files)
     if check.verdict == UNTOLD:
@@ -49,8 +48,9 @@ def crosscheck(
 
 def _save_angles(check: Any, path: Path) -> None:
     from ..interop.packages import import_open3d
+    from ..io.colors import attribute_shades
     from ..io.scans import save_tensor_cloud
 
     marked = import_open3d().t.geometry.PointCloud(check.points)
-    marked.point.angle = check.angle[:, None]
+    marked.point.angle, marked.point.colors = check.angle[:, None], attribute_shades(check.angle)
     save_tensor_cloud(marked, path)

@@ -8,9 +8,8 @@ from typing import Annotated, Any
 from typer import Option
 
 from .console import echo
-from .options import TREE_ENDINGS, CutLoops, SkeletonFile, SkeletonOutput, argument, option, output_option, root_option
+from .options import CutLoops, SkeletonFile, SkeletonOutput, argument, option, output_option, root_option
 from .outputs import Output, check_outputs, skeleton_outputs, tell, write_each
-from .reporting import WrongUsage
 
 
 def edit(
@@ -55,27 +54,22 @@ def edit(
 
 def convert(
     skeleton: SkeletonFile,
-    output: Annotated[list[Path], argument("FILE...", "Other formats, by their endings.")],
+    files: Annotated[list[Path] | None, argument("FILE...", "Other formats, by their endings.")] = None,
+    output: SkeletonOutput = None,
     cut_loops: CutLoops = False,
-    root: Annotated[Any, root_option("Where the tree grows from, in formats that hold only trees")] = None,
 ) -> None:
     """Write a skeleton in another format."""
     from ..io.skeletons import read_skeleton
 
-    outputs = skeleton_outputs(output, cut_loops=cut_loops, root=root)
-    check_outputs(outputs, skeleton)
-    trees = tuple(f".{ending}" for ending in TREE_ENDINGS)
-    if root is not None and not any(path.name.lower().endswith(trees) for path in output):
-        raise WrongUsage(
-            f"--root is for formats that hold only trees, {', '.join(TREE_ENDINGS)}: for others use 'glsk edit'"
-        )
+    outputs = skeleton_outputs([*(files or []), *(output or [])], cut_loops=cut_loops)
+    check_outputs(outputs, skeleton, needed="a FILE, or -o FILE")
     tell({}, lambda: None, write_each(outputs, read_skeleton(skeleton)))
 
 
 def rig(
     skeleton: SkeletonFile,
+    output: Annotated[Path, output_option("FILE", "The rig: glb, or bvh without surface.")],
     mesh: Annotated[Path | None, argument("MESH", "A mesh or a cloud; by default the skeleton's tubes.")] = None,
-    output: Annotated[list[Path] | None, output_option("FILE", "The rig: glb, or bvh without surface.")] = None,
     root: Annotated[Any, root_option("Which joint moves all others")] = None,
     cut_loops: Annotated[bool, Option("--cut-loops", help="Cut loops open; the surface stays whole.")] = False,
     up: Annotated[str, option("AXIS", "Which axis of the data points up: z or y.")] = "z",
@@ -89,9 +83,7 @@ def rig(
     from ..io.formats.gltf import RIG_ENDINGS
     from ..io.scans import read_mesh
 
-    if output is None or len(output) > 1:
-        raise WrongUsage(f"{'nothing to write' if output is None else 'rig writes one file'}: give one output with -o")
-    check_outputs([Output(output[0], RIG_ENDINGS, "rig is glTF or BVH", save_rig)], skeleton, mesh)
+    check_outputs([Output(output, RIG_ENDINGS, "rig is glTF or BVH", save_rig)], skeleton, mesh)
     curve = read_skeleton(skeleton)
     surface: Any = None
     if mesh is not None:
@@ -99,5 +91,5 @@ def rig(
             surface = read_mesh(mesh)
         except FileFormatError:
             surface = read_cloud(mesh)  # knows best what else may be wrong with the file
-    bones = save_rig(curve, output[0], surface, cut_loops=cut_loops, root=root, up=up)
-    tell({}, lambda: echo(f"{len(bones.edges)} bones"), {output[0]: ""})
+    bones = save_rig(curve, output, surface, cut_loops=cut_loops, root=root, up=up)
+    tell({}, lambda: echo(f"{len(bones.edges)} bones"), {output: ""})

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from ..errors import FileFormatError, InvalidParameterError, SkeletonWarning
 from .console import print_rows, progress
-from .options import Numbers, SkeletonFile, argument, option
-from .outputs import check_outputs, json_output, tell, write_each
+from .options import SkeletonFile, argument, option
+from .outputs import tell
 from .reporting import WrongUsage
 
 if TYPE_CHECKING:
@@ -26,7 +26,6 @@ def evaluate(
     truth: Annotated[
         Path | None, option("FILE", "Also compare with a known axis: npz with nodes, edges and radii, or a skeleton.")
     ] = None,
-    output: Numbers = None,
 ) -> None:
     """Measure how good a skeleton is.
 
@@ -38,8 +37,6 @@ def evaluate(
     from ..analysis import assess, compare
     from ..interop.clouds import cloud_points
 
-    outputs = [json_output(output)]
-    check_outputs(outputs, skeleton, cloud, truth)
     with progress() as update:
         update(f"reading {skeleton.name}")
         curve = read_skeleton(skeleton)
@@ -68,7 +65,7 @@ def evaluate(
             if facts[name] is not None:
                 print_rows(facts[name], title=name)
 
-    tell(facts, words, write_each(outputs, facts))
+    tell(facts, words)
 
 
 def _elsewhere(assessment: Assessment, vertices: np.ndarray, points: np.ndarray) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import re
+from itertools import chain
 from typing import TYPE_CHECKING, Annotated, Any
 
 from .console import echo, heading, print_table
@@ -29,18 +30,16 @@ def filters(
     known, pipelines = catalogue(), known_pipelines()
     if name is not None and name not in known and name not in pipelines:
         raise WrongUsage(did_you_mean(name, [*known, *pipelines], "filter or pipeline"))
-    filter_facts = [_filter_facts(cls) for key, cls in known.items() if name in (None, key)]
-    pipeline_facts = [_pipeline_facts(key, make) for key, make in pipelines.items() if name in (None, key)]
+    found = {
+        "filters": [_filter_facts(cls) for key, cls in known.items() if name in (None, key)],
+        "pipelines": [_pipeline_facts(key, make) for key, make in pipelines.items() if name in (None, key)],
+    }
 
     def words() -> None:
-        for facts in filter_facts:
-            flow = f"{facts['consumes']} -> {facts['produces']}" if facts["consumes"] else facts["kind"]
-            _print_facts(facts, flow, map(_parameter_row, facts["parameters"]), name is not None)
-        for facts in pipeline_facts:
-            stages = (("  |" if i else "", stage) for i, stage in enumerate(facts["stages"]))
-            _print_facts(facts, "pipeline", stages, name is not None)
+        for facts in chain(*found.values()):
+            _print(facts, full=name is not None)
 
-    tell({"filters": filter_facts, "pipelines": pipeline_facts}, words)
+    tell(found, words)
 
 
 def _filter_facts(cls: type[Parameters]) -> dict[str, Any]:
@@ -51,64 +50,44 @@ def _filter_facts(cls: type[Parameters]) -> dict[str, Any]:
     if issubclass(cls, Filter):
         kinds = {name: getattr(cls, name) for name in flow}
         flow = {name: "cloud" if kind is Cloud else kind.__name__ for name, kind in kinds.items()}
+    kind = "filter" if flow["consumes"] else "stopping rule"
     fields = dataclasses.fields(cls)  # type: ignore[arg-type]
-    return {
-        "name": cls.__name__,
-        "kind": "filter" if flow["consumes"] else "stopping rule",
-        "plugin": _plugin(cls),
-        **flow,
-        "doc": _prose(cls),
-        "parameters": [
-            {"name": field.name, **field.metadata, "default": _default(field), "limits": limits(field.metadata)}
-            for field in fields
-        ],
-    }
+    parameters = [{"name": field.name, **field.metadata, "default": _default(field)} for field in fields]
+    return {"name": cls.__name__, "kind": kind, **_origin(cls), **flow, "parameters": parameters}
 
 
 def _pipeline_facts(name: str, make) -> dict[str, Any]:
-    made = make()
-    stages = [repr(stage) for stage in made.stages]
-    return {"name": name, "plugin": _plugin(make), "doc": _prose(make), "expression": repr(made), "stages": stages}
-
-
-def limits(metadata) -> str:
-    """The limits of a parameter in words, such as "above 0, at most 1"; empty if it has none."""
-    words = [" or ".join(metadata["choices"])] if metadata["choices"] else []
-    if metadata["low"] is not None:
-        words.append(f"{'above' if metadata['open_low'] else 'at least'} {metadata['low']:g}")
-    if metadata["high"] is not None:
-        words.append(f"at most {metadata['high']:g}")
-    return ", ".join(words)
+    stages = make().stages
+    return {"name": name, "kind": "pipeline", **_origin(make), "expression": " | ".join(map(repr, stages))}
 
 
 def _default(field: dataclasses.Field[Any]) -> Any:
     return repr(field.default) if dataclasses.is_dataclass(field.default) else field.default
 
 
-def _plugin(thing) -> str | None:
-    """The package that a filter or pipeline is from, None for this one."""
+def _origin(thing) -> dict[str, Any]:
+    """The package that a filter or pipeline is from, None for this one, and what its docstring says first.
+
+    That is all up to the first section, a line per paragraph, with the markup of formulas and code taken off.
+    """
     package = getattr(thing, "__module__", "").partition(".")[0]
-    return None if package == __package__.partition(".")[0] else package
-
-
-def _prose(documented) -> str:
-    """The docstring up to its first section, a line per paragraph, with the markup of formulas and code taken off."""
-    text = re.split(r"\n\n\w[\w ]*\n-{3,}\n", inspect.getdoc(documented) or "", maxsplit=1)[0]
+    text = re.split(r"\n\n\w[\w ]*\n-{3,}\n", inspect.getdoc(thing) or "", maxsplit=1)[0]
     text = re.sub(r"(?<!\n)\n(?!\n)", " ", text)
-    return re.sub(r":math:`([^`]*)`|``([^`]*)``|`([^`]*)`", lambda m: m[1] or m[2] or m[3], text)
+    text = re.sub(r":math:`([^`]*)`|``([^`]*)``|`([^`]*)`", lambda m: m[1] or m[2] or m[3], text)
+    return {"plugin": None if package == __package__.partition(".")[0] else package, "doc": text}
 
 
-def _print_facts(facts: dict[str, Any], kind: str, rows, full: bool) -> None:
-    heading(f"{facts['name']}  {kind}" + f", from {facts['plugin']}" * bool(facts["plugin"]))
+def _print(facts: dict[str, Any], *, full: bool) -> None:
+    flow = f"{facts['consumes']} -> {facts['produces']}" if facts["kind"] == "filter" else facts["kind"]
+    heading(f"{facts['name']}  {flow}" + f", from {facts['plugin']}" * bool(facts["plugin"]))
     print_table([[facts["doc"] if full else facts["doc"].partition("\n\n")[0]]], wrap=True)
+    rows = [("", facts["expression"])] if facts["kind"] == "pipeline" else map(_parameter_row, facts["parameters"])
     print_table(rows, wrap=True)
     echo()
 
 
 def _parameter_row(parameter: dict[str, Any]) -> tuple[str, str]:
+    from ..parameters import allowed_values
+
     default = "none" if parameter["default"] is None else parameter["default"]
-    kind = parameter["type"].replace("stop", "stopping rule").replace("?", " or none")
-    unit = "" if parameter["unit"] == "-" else f" [{parameter['unit']}]"
-    bounds = f", {parameter['limits']}" if parameter["limits"] else ""
-    shape = parameter["limits"] if parameter["type"] == "choice" else kind + unit + bounds
-    return f"  {parameter['name']}", f"{parameter['doc']}\n{shape}; default {default}"
+    return f"  {parameter['name']}", f"{parameter['doc']}\n{allowed_values(parameter)}; default {default}"

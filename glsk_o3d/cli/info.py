@@ -1,4 +1,4 @@
-"""``glsk info``: what is in a file, and which files can be read."""
+"""``glsk info``: what is in a file."""
 
 from __future__ import annotations
 
@@ -18,17 +18,13 @@ FEW_VALUES = 12  # fitted: that an attribute may have for all of them to be list
 
 
 def info(
-    file: Annotated[Path | None, argument("[FILE]", "A cloud, mesh or skeleton; or none, for the formats.")] = None,
+    file: Annotated[Path, argument("FILE", "A cloud, mesh or skeleton.")],
     where: Where = None,
 ) -> None:
     """Say what is in a cloud or skeleton file."""
     from ..analysis.summary import ITERATION_COLUMNS, iteration_rows
     from ..io.skeletons import holds_skeleton, read_skeleton
 
-    if file is None:
-        formats = _formats()
-        tell(formats, lambda: print_rows(formats))
-        return
     if holds_skeleton(file):
         skeleton = read_skeleton(file)
         facts, records = _skeleton_facts(skeleton), skeleton.report.iterations
@@ -42,24 +38,6 @@ def info(
 
     steps = {"iterations": list(map(asdict, records))} if records else {}
     tell({"file": str(file), **facts, **steps}, words)
-
-
-def _formats() -> dict[str, Any]:
-    """The endings that are read and written, and what is missing for some."""
-    from ..errors import MissingPackageError
-    from ..interop.packages import require_for
-    from ..io.paths import CLOUD_ENDINGS, MESH_ENDINGS
-    from ..io.skeletons import FORMATS, READABLE
-
-    lacking = {}
-    for ending in (*CLOUD_ENDINGS, *MESH_ENDINGS, *READABLE):
-        try:
-            require_for(ending)
-        except MissingPackageError as error:
-            lacking[ending] = str(error)
-    written = tuple(ending for ending in FORMATS if ending not in READABLE)
-    kinds = {"clouds": CLOUD_ENDINGS, "meshes": MESH_ENDINGS, "skeletons": READABLE}
-    return {**kinds, "only_written": written, "lacking": lacking}
 
 
 def _cloud_facts(file: Path, where: str | None) -> dict[str, Any]:

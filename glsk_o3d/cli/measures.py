@@ -38,7 +38,7 @@ def branches(
             return
         columns = table.printed()
         names = [name.replace("_", " ") for name in columns]
-        print_table(list(zip(*columns.values(), strict=True)), names, left=[names.index("kind")])
+        print_table(zip(*columns.values(), strict=True), names)
 
     tell({"skeleton": str(skeleton), "branches": list(table)}, words, write_each(outputs, table))
 

@@ -67,7 +67,6 @@ SkeletonOutput = Annotated[
         "FILE", f"Where to write the skeleton: {', '.join(SKELETON_ENDINGS)}, by the ending; may be repeated."
     ),
 ]
-Numbers = Annotated[Path | None, output_option("JSON", "Write all numbers to a file.")]
 Preview = Annotated[Path | None, option("PNG", "Also draw cloud and skeleton.")]
 ReportPage = Annotated[
     Path | None, option("HTML", "Also write a page to look at: turn, zoom, watch the contraction, read.", "--report")

@@ -17,7 +17,6 @@ from .options import SKELETON_ENDINGS
 from .reporting import WrongUsage
 
 if TYPE_CHECKING:
-    from ..refinement.rooted import RootPlace
     from ..viewing.page import ContractionRecorder
 
 
@@ -37,26 +36,18 @@ def skeleton_outputs(
     *,
     title: str = "",
     cut_loops: bool = False,
-    root: RootPlace | None = None,
     recorder: ContractionRecorder | None = None,
 ) -> list[Output]:
     """The files of a skeleton, its picture and its page; the recorder watches the run, for the page."""
     from .. import save_preview, save_report, save_skeleton
 
     endings = tuple(f".{ending}" for ending in SKELETON_ENDINGS)
-    save = partial(save_skeleton, cut_loops=cut_loops, root=root)
+    save = partial(save_skeleton, cut_loops=cut_loops)
     return [
         *(Output(path, endings, "file is a skeleton", save) for path in skeletons or []),
         Output(preview, (".png",), "picture is a PNG", partial(save_preview, title=title)),
         Output(page, (".html", ".htm"), "report is a page", partial(save_report, recorder=recorder, title=title)),
     ]
-
-
-def json_output(path: Path | None) -> Output:
-    """The file for all numbers of a command."""
-    from ..interop.atomic import write_json
-
-    return Output(path, (".json",), "report is JSON", lambda facts, path: write_json(path, facts))
 
 
 def check_outputs(outputs: Iterable[Output], *inputs: Path | None, needed: str | None = None) -> None:

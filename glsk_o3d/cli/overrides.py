@@ -9,7 +9,6 @@ from ..errors import InvalidParameterError, did_you_mean
 from ..parameters import Parameters
 from ..pipeline import Pipeline
 from ..recipes.catalogue import catalogue, serves
-from ..tracer import Tracer
 
 _BOOLS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
 
@@ -17,13 +16,6 @@ _BOOLS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no"
 def choose(pipeline: str, settings: Iterable[str] | None = (), drop_invalid: bool = False) -> Pipeline:
     """The pipeline, from a cloud to a skeleton, that the options of a command ask for."""
     return override(as_pipeline(pipeline), [*(settings or ()), *["drop_invalid=true"] * drop_invalid])
-
-
-def grown_from(root: str, pipeline: Pipeline) -> Pipeline:
-    """A pipeline that makes one tree; one that ends without a Tracer gets one, which traces nothing else."""
-    if not any(isinstance(stage, Tracer) for stage in pipeline.stages):
-        pipeline = pipeline | Tracer(surface=0)
-    return override(pipeline, [f"Tracer.root={root}"])
 
 
 def override(pipeline: Pipeline, settings: Iterable[str]) -> Pipeline:

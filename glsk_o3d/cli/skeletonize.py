@@ -8,13 +8,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from typer import Option
-
 from . import options
-from .console import echo, flags, print_rows, progress, say
+from .console import echo, flags, print_rows, progress
 from .options import option, output_option
 from .outputs import Output, check_outputs, skeleton_outputs, tell, write_each
-from .reporting import WrongUsage
 
 if TYPE_CHECKING:
     from ..skeleton import Skeleton
@@ -28,16 +25,9 @@ def skeletonize(
     pipeline: options.PipelineName = "default",
     settings: options.Settings = None,
     where: options.Where = None,
-    root: Annotated[
-        str | None, option("ROOT", "Grow one tree from there: x to -z, lowest along an axis, thickest, or x,y,z.")
-    ] = None,
     tubes: Annotated[Path | None, option("MESH", "Also write tubes as thick as the object: ply or obj.")] = None,
     labelled: Annotated[
         Path | None, option("CLOUD", "Also write the scan with branch, radius, ... of every point, as ply.")
-    ] = None,
-    save_recipe: Annotated[Path | None, option("FILE", "Also write the pipeline to a json or toml file.")] = None,
-    stream: Annotated[
-        bool | None, Option("--stream/--no-stream", help="Read only a sample; by default if over ten million points.")
     ] = None,
     support: Annotated[
         int | None, option("SAMPLES", "Also skeletonise so many samples, and say what they share; 8 are enough.", min=2)
@@ -47,19 +37,18 @@ def skeletonize(
 ) -> None:
     """Compute the curve skeleton of a scan.
 
-    Everything that can be checked is checked before the computation starts. Files appear complete or not at all.
+    Everything that can be checked is checked before the computation starts. Files appear complete or not at all. Of
+    files with more than ten million points only a sample is read.
     """
-    from .. import ContractionRecorder, annotate_file, read_cloud, recipes, save_mesh, to_tubes
+    from .. import ContractionRecorder, annotate_file, read_cloud, save_mesh, to_tubes
     from ..interop.packages import require
     from ..io.meshes import WRITTEN_MESH_ENDINGS
     from ..io.scans import WRITTEN_CLOUD_ENDING
     from ..io.streaming import sample_for
     from ..resampling import with_support
-    from .overrides import choose, grown_from
+    from .overrides import choose
 
     chosen = choose(pipeline, settings, drop_invalid)
-    if root is not None:
-        chosen = grown_from(root, chosen)
     recorder = ContractionRecorder() if report is not None else None
 
     def label(skeleton: Skeleton, path: Path) -> None:
@@ -70,26 +59,19 @@ def skeletonize(
         Output(tubes, WRITTEN_MESH_ENDINGS, "tubes are a mesh", lambda it, path: save_mesh(to_tubes(it), path)),
         Output(labelled, (WRITTEN_CLOUD_ENDING,), "cloud with labels is PLY", label),
     ]
-    if all(result.path is None for result in results):
-        raise WrongUsage("nothing to write: give -o, --tubes or --labelled, a --preview or a --report")
-    saved = Output(
-        save_recipe, (".json", ".toml"), "file is a recipe", lambda _, path: recipes.save_recipe(chosen, path)
-    )
-    check_outputs([*results, saved], scan, Path(pipeline))
+    check_outputs(results, scan, Path(pipeline), needed="-o, --tubes or --labelled, a --preview or a --report")
     if tubes is not None or labelled is not None:
         require("matplotlib")  # for the colours of branches
-    if save_recipe is not None:
-        recipes.to_recipe(chosen)  # not all can be written
     with progress() as update:
         update(f"reading {scan.name}")
-        cloud = sample_for(chosen, scan, where, stream)
+        cloud = sample_for(chosen, scan, where)
         if cloud is None:
             cloud = read_cloud(scan, where=where)
         skeleton, seconds = _run(chosen, cloud, update, recorder)
         if support is not None:
             comparing = "comparing with the skeleton of sample {} of {}"
             skeleton = with_support(skeleton, chosen, support, on_draw=lambda *n: update(comparing.format(*n), *n))
-        files = write_each([*results, saved], skeleton, update)
+        files = write_each(results, skeleton, update)
     _tell(skeleton, seconds, files)
 
 
@@ -102,25 +84,19 @@ def demo(
     It is a toy dinosaur with a carrying handle on its back, scanned from two sides. Writes cloud.ply (the scan),
     skeleton.ply, skeleton.json and skeleton.png (the picture to look at).
     """
-    from .. import MissingPackageError, samples, save_tensor_cloud
-    from ..interop.packages import import_open3d, require_for
+    from .. import samples, save_tensor_cloud
+    from ..interop.packages import import_open3d
 
     if folder.exists() and not folder.is_dir():
         raise NotADirectoryError(f"{folder}: is a file, not a folder")
     folder.mkdir(parents=True, exist_ok=True)
-    o3d, picture, missing = import_open3d(), folder / "skeleton.png", ""
-    try:
-        require_for(picture.suffix)
-    except MissingPackageError as error:  # all else can be shown
-        missing = f"no {picture.name}: {error}"
+    o3d = import_open3d()
     cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(samples.sample_object(points).points))
     save_tensor_cloud(cloud, folder / "cloud.ply")
     if not (flags.quiet or flags.as_json):
         echo(f"wrote {folder / 'cloud.ply'}")
     outputs = [folder / "skeleton.ply", folder / "skeleton.json"]
-    skeletonize(folder / "cloud.ply", outputs, None if missing else picture)
-    if missing and not flags.quiet:
-        say("warning", missing)
+    skeletonize(folder / "cloud.ply", outputs, preview=folder / "skeleton.png")
 
 
 def _run(pipeline: Callable[..., Skeleton], cloud: Any, update, on_state=None) -> tuple[Skeleton, float]:
@@ -152,16 +128,10 @@ def _shown(facts: Mapping[str, Any], skeleton: Skeleton) -> dict[str, Any]:
     from ..analysis.summary import ENDING_FACTS, ending, structure
 
     report, graph = skeleton.report, structure(skeleton)
-    hidden = {
-        *ENDING_FACTS,
-        "seconds",
-        "agreeing",
-        "loops_closed",
-    }  # most clouds have such loops, which are hardly ever true ones
+    hidden = {*ENDING_FACTS, "seconds", "agreeing", "loops_closed"}  # hardly ever true loops
     hidden |= {"sampled"} if not report.is_sampled else set()
     hidden |= {"contracted"} if facts["contracted"] == facts["distinct"] else set()
-    told = {name: facts[name] for name in facts if name in graph or facts[name] or facts[name] is False}
-    shown = {name: value for name, value in told.items() if name not in hidden}
+    shown = {name: it for name, it in facts.items() if name not in hidden and (name in graph or it)}
     shown["uncertain"] = [f"{call}; if that is wrong: --set {call.otherwise}" for call in report.uncertain]
     if report.n_draws:
         agreeing = f"{report.n_agreeing} of {report.n_draws} have the same graph"

@@ -106,23 +106,17 @@ def _cloud(points: np.ndarray, counts: np.ndarray) -> Any:
     return cloud
 
 
-def sample_for(
-    pipeline: Pipeline[Any], path: str | os.PathLike, where: str | None = None, stream: bool | None = None
-) -> Any | None:
+def sample_for(pipeline: Pipeline[Any], path: str | os.PathLike, where: str | None = None) -> Any | None:
     """The sample of a file that a pipeline takes of its points, as from `read_sample`, where that is worth while.
 
-    By default that is where the file has more than ten million points; `stream` asks for it or forbids it. None where
-    all is to be read; InvalidParameterError if a sample is asked for and the pipeline takes all points. Where the
-    pipeline drops points that are not finite, the last one is NaN and stands for them, so that its report counts them.
+    That is where the file has more than ten million points and the pipeline does not take all; else None, and all is to
+    be read. Where the pipeline drops points that are not finite, the last one is NaN and stands for them, so that its
+    report counts them.
     """
-    if stream is False:
-        return None
-    sampler, n = pipeline.stages[0], promised_points(path)
+    sampler = pipeline.stages[0]
     if not isinstance(sampler, Sampler) or sampler.sample_size(LARGE_CLOUD) >= LARGE_CLOUD:
-        if stream:
-            raise InvalidParameterError("this pipeline takes all points of a cloud: it cannot be given a sample")
         return None
-    if stream is None and (n is None or n <= LARGE_CLOUD):
+    if (promised_points(path) or 0) <= LARGE_CLOUD:
         return None
     points, counts, dropped = _sampled(path, sampler.sample_size, where, sampler.drop_invalid)
     if dropped:

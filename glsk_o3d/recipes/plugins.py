@@ -90,4 +90,3 @@ def _check_pipeline(name: str, make: Any) -> None:
     made = make() if callable(make) else make
     if not callable(make) or not isinstance(made, Pipeline):
         raise _Unfit(f"it must be a callable that returns a Pipeline, and gives a {type(made).__name__}")
-    made.check()

@@ -50,7 +50,6 @@ def to_recipe(pipeline: Pipeline) -> dict[str, Any]:
     >>> to_recipe(Pipeline(LPRReducer()))["pipeline"]
     [{'filter': 'LPRReducer', 'phi': 100000.0, 'conserve_mass': True, 'mend_rings': True, 'order': 'cheapest'}]
     """
-    pipeline.check()
     recipe = recipe_of(*(stage.table() for stage in pipeline.stages))
     from_recipe(recipe)  # refuses what it could not make again
     return recipe
@@ -255,8 +254,6 @@ def _values(cls: type[Parameters], table: Any, path: str) -> dict[str, Any]:
 def _valid(make: Callable[[], Any], path: str) -> Any:
     """What is made, checked as a whole: stages that do not fit, and whatever else a filter demands."""
     try:
-        made = make()
-        made.check()
+        return make()
     except (ValueError, TypeError) as error:  # InvalidParameterError, or what a plugin raises
         raise RecipeError(f"{path}: {error}") from None
-    return made

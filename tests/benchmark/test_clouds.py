@@ -70,11 +70,6 @@ def test_a_cloud_follows_from_its_names_and_numbers(variant, drawn, fingerprint)
         assert not np.allclose(first, other)
 
 
-@pytest.mark.parametrize("variant", VARIANTS)
-def test_tiny_clouds(variant, drawn):
-    assert cloud(drawn("handles", 0), variant, 1).shape == (1, 3)
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

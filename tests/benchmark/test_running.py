@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 import sys
 import time
 
@@ -197,18 +196,3 @@ def test_the_python_program(page, small, tmp_path):
     expected = longest(np.asarray(read_cloud(cloud.path).points))
     np.testing.assert_allclose(found[found[:, 0].argsort()], expected, atol=1e-6)
     assert all(row["perfect"] for row in score_answers(small, tmp_path / "mine").rows)
-
-
-@pytest.mark.skipif(shutil.which("od") is None or sys.platform != "linux", reason="needs od of GNU")
-def test_the_script_around_a_program_with_formats_of_its_own(page, small, tmp_path, monkeypatch):
-    (tmp_path / "mine.sh").write_text(page("shell"))
-    mytool = tmp_path / "bin" / "mytool"
-    mytool.parent.mkdir()
-    mytool.write_text('#!/bin/sh\necho 2 $(head -n 1 "$1") $(tail -n 1 "$1")\n')
-    mytool.chmod(0o755)
-    monkeypatch.setenv("PATH", str(mytool.parent), prepend=":")
-    words = f"sh {tmp_path / 'mine.sh'} {{cloud}} {{skeleton}}"
-    assert run(small, tmp_path / "mine", command=words, ending=".cgal").failures == {}
-    cloud = small.scored[0]
-    found = read_skeleton(tmp_path / "mine" / f"{cloud.name}.cgal").vertices
-    np.testing.assert_allclose(found, np.asarray(read_cloud(cloud.path).points)[[0, -1]], atol=1e-6)

@@ -130,6 +130,3 @@ def test_refused_draws_are_counted(monkeypatch):
 def test_what_makes_no_shape_is_refused(family, seed, message):
     with pytest.raises(InvalidParameterError, match=message):
         shape(family, seed)
-
-
-# ------------------------------------------------------------------------------------------------------ parts of shapes

@@ -169,6 +169,3 @@ def fork(length):
 def test_what_is_refused_and_what_just_is_not(word, bad, good, spacing):
     assert fault_of(bad, spacing) == word
     assert fault_of(good, spacing) is None
-
-
-# ------------------------------------------------------------------------------------------------------- the same again

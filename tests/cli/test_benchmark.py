@@ -6,8 +6,6 @@ import sys
 
 import pytest
 
-from glsk_o3d.errors import InvalidParameterError
-
 CHOICE = ("--families", "tubes,trees", "--seeds", "100:102", "--variants", "clean, scan2", "--jobs", 1)
 """Rods in the place of the shapes, of which one cloud of eight is not scored."""
 ONE = ("--families", "tubes", "--variants", "clean", "--jobs", 1)
@@ -67,44 +65,6 @@ def test_json(invoke, rods, program):
     assert (scored["name"], scored["failures"], scored["files"]) == ("mine", 1, ["s.json"])
     table = json.loads(invoke("benchmark", "table", "s.json", "--json").stdout)
     assert table["entries"][0]["all"]["perfect"] == scored["perfect"]
-
-
-def test_seeds_in_words_and_another_cloud_than_is_meant(invoke, rods, monkeypatch):
-    from glsk_bench import versions
-
-    invoke("benchmark", "make", "a", *ONE, "--seeds", "7, 100")
-    assert rods == ["tubes_7", "tubes_100"]
-    monkeypatch.setattr(versions, "fingerprints", lambda name: {"tubes_100_clean": "00000000 1 2"})
-    made = invoke("benchmark", "make", "b", *ONE, "--seeds", "100")
-    assert made.stderr == "glsk: warning: 1 clouds are not those that v1 means: see benchmark.json\n"
-    assert "sameness  1 other" in made.stdout
-
-
-def test_a_cloud_that_cannot_be_made_is_named(invoke, rods, monkeypatch):
-    def cloud(shape, variant, n=4096, seed=0):
-        raise InvalidParameterError("too little is seen")
-
-    monkeypatch.setattr(sys.modules["glsk_bench.clouds"], "cloud", cloud)
-    made = invoke("benchmark", "make", "a", *ONE, "--seeds", "100")
-    assert made.stderr == "glsk: warning: 1 clouds cannot be made, see benchmark.json: tubes_100_clean\n"
-    assert "clouds   0" in made.stdout
-
-
-def test_several_clouds_of_each_object(invoke, rods, program, tmp_path):
-    drawn = invoke("benchmark", "sample", "objects", "--version", "v1", "--draws", 2, "--points", 100)
-    assert (drawn.exit_code, drawn.stderr) == (0, "")
-    assert drawn.stdout.splitlines() == ["folder   objects", "objects  6", "clouds   12"]
-    command = quoted(program("write(skeleton)"))
-    invoke("benchmark", "run", "objects", "mine", "--command", command, "--ending", ".obj", "-q")
-    shown = invoke("benchmark", "repeat", "objects", "mine", "-o", "r.json")
-    assert (shown.exit_code, shown.stderr) == (0, "")
-    lines = shown.stdout.splitlines()
-    assert lines[0] == "**mine: answers to several clouds of each object**"
-    assert lines[-2].startswith("| mean | 0.00 |")
-    assert lines[-1] == "wrote r.json"
-    told = json.loads(invoke("benchmark", "repeat", "objects", "mine", "--name", "x", "--json").stdout)
-    assert (told["name"], told["means"]["agree"], len(told["objects"]), told["files"]) == ("x", 1, 6, [])
-    assert json.loads((tmp_path / "r.json").read_text())["objects"] == told["objects"]
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,7 @@ def test_edits_one_after_the_other(invoke, file, tmp_path):
 
 
 def test_convert(invoke, file, tmp_path):
-    result = invoke("convert", file, "a.ply", "a.graphml", "a.obj")
+    result = invoke("convert", file, "a.ply", "-o", "a.obj", "a.graphml")
     assert result.stdout == "wrote a.ply\nwrote a.graphml\nwrote a.obj\n"
     for name in ("a.ply", "a.graphml", "a.obj"):
         assert read_skeleton(tmp_path / name).n_loops == 1
@@ -62,18 +62,12 @@ def line(tmp_path):
 )
 def test_a_root_in_all_words(invoke, line, tmp_path, word, x):
     names = [f"t.{name}" for name in ("swc", "urdf", "glb")]
-    assert invoke("convert", line, *names, "--root", word).stderr == ""
+    outputs = [each for name in (*names, "e.json") for each in ("-o", name)]
+    assert invoke("edit", line, *outputs, "--root", word).stderr == ""
     for name in names:
         save_skeleton(read_skeleton(line), tmp_path / f"expected-{name}", root=[x, 0, 0])
         assert (tmp_path / name).read_bytes() == (tmp_path / f"expected-{name}").read_bytes()
-    assert invoke("edit", line, "-o", "e.json", "--root", word).exit_code == 0
     assert read_skeleton("e.json").vertices[0].tolist() == [x, 0, 0]
-
-
-def test_a_root_is_for_formats_of_trees(invoke, line):
-    assert invoke("convert", line, "a.ply", "a.swc", "--root", "-x").exit_code == 0
-    assert [read_skeleton(path).vertices[0].tolist() for path in ("a.ply", "a.swc")] == [[-1, 0, 0], [2, 0, 0]]
-    assert "a.swc: root = 7: there are vertices 0 to 3" in invoke("convert", line, "a.swc", "--root", "7").stderr
 
 
 def test_formats_of_trees_are_those_of_the_table():

@@ -43,7 +43,7 @@ def test_whatever_prints(capfd):
 @pytest.mark.parametrize(
     "words",
     [
-        ["skeletonize", "s\x1b]0;t\x07.xyz", "-o", "k\x1b[31m.json", "--stream"],
+        ["skeletonize", "s\x1b]0;t\x07.xyz", "-o", "k\x1b[31m.json"],
         ["info", "bad\x1b[2J.json"],
         ["info", "--where", "x\x1b[31m > 3", "s\x1b]0;t\x07.xyz"],
         ["run", "bad\x1b[2J.mlx", "s\x1b]0;t\x07.xyz", "-o", "o.ply"],

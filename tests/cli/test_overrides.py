@@ -53,7 +53,7 @@ def test_round_trip_of_every_pipeline():
             f"{type(part).__name__}.{f.name}={value}"
             for part in parts(pipeline)
             for f in dataclasses.fields(part)
-            if dataclasses.is_dataclass(value := getattr(part, f.name)) is False
+            if not dataclasses.is_dataclass(value := getattr(part, f.name))
         ]
         start = default() if find(pipeline, "Contractor").reducer else cao2010()
         kinds = {type(stage) for stage in pipeline.stages}

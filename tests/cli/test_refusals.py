@@ -15,35 +15,32 @@ TABLE = """
     2 branches y.ply -o y.txt                              | y.txt: the table is CSV and its name ends in .csv
     2 tree y.ply --root a,b,c                              | root = 'a,b,c': must be an axis
     2 tree y.ply --unit 0                                  | unit = '0': must be metres, above 0, or one of m, cm, mm
-    2 tree o.ply                                           | 1 loops: cylinders need a tree; see pipelines.tree()
-    2 tree two.json                                        | 2 components: cylinders need one tree
+    2 tree o.ply                                           | see 'glsk skeletonize --pipeline tree'
+    2 tree two.json                                        | --pipeline tree' and 'glsk edit --largest'
     2 tree y.ply -o c.xlsx                                 | c.xlsx: the file is a table of cylinders and its name ends
     2 edit o.ply                                           | nothing to write: give an output with -o
     2 edit o.ply -o o.ply                                  | o.ply: is an input
     1 convert o.ply a.swc                                  | a.swc: this format holds trees only
     2 convert o.ply a.nope                                 | a.nope: the file is a skeleton and its name ends in
-    2 convert y.ply a.ply --root x                         | for others use 'glsk edit'
-    2 rig y.ply                                            | nothing to write: give one output with -o
-    2 rig y.ply -o a.glb -o b.glb                          | rig writes one file: give one output with -o
+    2 convert y.ply                                        | nothing to write: give a FILE, or -o FILE
     2 rig none.ply -o r.fbx                                | r.fbx: the rig is glTF or BVH and its name ends in .glb
     1 rig y.ply y.ply -o r.glb                             | y.ply: is a skeleton, not a scan
     1 rig y.ply junk.ply -o r.glb                          | junk.ply: not a valid .ply file: it does not start with
     1 rig y.ply nan.xyz -o r.glb                           | nan.xyz: the surface has points that are not finite: drop
-    1 rig o.ply -o r.glb                                   | 1 loop(s): pass cut_loops=True (--cut-loops) to drop
+    1 rig o.ply -o r.glb                                   | 1 loop(s): pass --cut-loops to drop
     1 rig bare.obj -o r.glb                                | a rig needs radii or points: read the skeleton from
-    2 grasps rod.npz --opening -1                          | max_opening = -1.0: must be above 0
+    2 grasps rod.npz --opening -1                          | --opening = -1.0: must be above 0
     2 grasps rod.npz --opening 1 --plane 0,0,1             | --plane 0,0,1: write 4 numbers with commas
     2 grasps rod.npz --opening 1 --plane 0,0,0,1           | is no plane
     2 grasps rod.npz --opening 1 --cone z                  | --cone ,z: write 4 numbers
     2 grasps rod.npz --opening 1 --cone z,270              | the angle of cone = 270.0: must be
     2 grasps rod.npz --opening 1 -o g.ply                  | the grasps are JSON or CSV and its name ends in .json
-    2 grasps y.ply --opening 1                             | has no confidence, perhaps due to its file: give min_con
-    2 grasps y.ply --opening 1 --min-confidence 0          | has no points of the object: give cloud=
+    2 grasps y.ply --opening 1                             | has no confidence, perhaps due to its file: give --min-
+    2 grasps y.ply --opening 1 --min-confidence 0          | has no points of the object: give --cloud FILE
     1 grasps rod.npz --opening 1 --scene none.ply          | none.ply: no such file
     1 evaluate y.ply SCANS/ring.ply --truth none.npz       | none.npz: not a valid truth: the truth has no nodes
     1 evaluate dot.ply SCANS/ring.ply                      | dot.ply: the skeleton has no edge with a length
     1 evaluate y.ply few.xyz                               | few.xyz: no part of the skeleton has 6 points around it
-    2 evaluate y.ply SCANS/ring.ply -o r.txt               | r.txt: the report is JSON and its name ends in .json
     1 crosscheck SCANS/nan.ply                             | nan.ply: 2 of 1000 points
     1 info SCANS/empty.ply                                 | empty.ply: the file is empty
     1 info none.ply                                        | none.ply: no such file
@@ -62,7 +59,6 @@ BEFORE_ANY_RUN = """
     2 skeletonize SCANS/ring.ply --report s.pdf            | s.pdf: the report is a page and its name ends in .html
     2 skeletonize SCANS/ring.ply --tubes s.xyz             | s.xyz: the tubes are a mesh and its name ends in .ply or
     2 skeletonize SCANS/ring.ply --labelled s.pcd          | s.pcd: the cloud with labels is PLY and its name ends
-    2 skeletonize SCANS/ring.ply --save-recipe a.yaml -o a.ply | a.yaml: the file is a recipe and its name ends in
     2 skeletonize SCANS/ring.ply -o s.ply -o ./s.ply       | s.ply: is named twice
     2 skeletonize SCANS/ring.ply -o SCANS/ring.ply         | is an input
     1 skeletonize SCANS/ring.ply -o no/where/s.ply         | no/where: no such folder
@@ -71,11 +67,10 @@ BEFORE_ANY_RUN = """
     2 skeletonize SCANS/ring.ply -o s.ply --pipeline wen2042 | no pipeline is called 'wen2042': did you mean 'wen2024'?
     2 skeletonize SCANS/ring.ply -o s.ply --set radios=1   | did you mean 'radius'
     2 skeletonize SCANS/ring.ply -o s.ply --set Connector.radius=-1 | Connector.radius = -1.0: must be above 0
-    2 skeletonize SCANS/ring.ply -o s.ply --stream --pipeline wen2024 | this pipeline takes all points of a cloud
     1 skeletonize none.ply -o s.ply                        | none.ply: no such file
     1 skeletonize SCANS/empty.ply -o s.ply                 | empty.ply: the file is empty
     1 skeletonize folder.ply -o s.ply                      | folder
-    1 skeletonize SCANS/nan.ply -o s.ply                   | nan.ply: 2 of 1000 points have NaN
+    1 skeletonize SCANS/nan.ply -o s.ply                   | the first at index 3: drop them with --drop-invalid
     1 skeletonize none.xyz -o s.ply                        | none.xyz: none of its 20 points has finite coordinates
     2 run                                                  | a SCRIPT and a SCAN are needed
     2 run glskeleton SCANS/ring.ply                        | nothing to write

@@ -41,9 +41,9 @@ def check(ring):
 def grid():
     """Faces of a grid of n by m vertices, closed in either direction or not."""
 
-    def make(n, m, close_n, close_m, shift=0):
+    def make(n, m, close_n, close_m):
         i, j = (a.ravel() for a in np.mgrid[: n - 1 + close_n, : m - 1 + close_m])
-        corners = [shift + (i + a) % n * m + (j + b) % m for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
+        corners = [(i + a) % n * m + (j + b) % m for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
         return np.concatenate([np.column_stack([corners[k] for k in which]) for which in ((0, 1, 2), (0, 2, 3))])
 
     return make

@@ -1,6 +1,7 @@
 """The cross-check of a cloud against a mesh: what agrees, what must not, and what cannot be checked."""
 
 import json
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -15,13 +16,13 @@ from glsk_o3d import (
     Refiner,
     RingBuilder,
     Sampler,
+    pipelines,
     samples,
     skeletonize,
 )
-from glsk_o3d.crosscheck import cross_check
-from glsk_o3d.crosscheck.agreement import compare_rows, compare_skeletons, mesh_fit
-from glsk_o3d.crosscheck.mesh import ball_pivoting, spacing
-from glsk_o3d.crosscheck.mesh_rings import border_lengths
+from glsk_o3d.crosscheck import CrossCheck, cross_check
+from glsk_o3d.crosscheck.agreement import compare_rows, compare_skeletons
+from glsk_o3d.crosscheck.mesh import ball_pivoting
 from glsk_o3d.errors import InvalidCloudError, InvalidParameterError, SkeletonWarning
 
 SPIKY = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
@@ -30,21 +31,10 @@ SPIKY = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
 @pytest.mark.parametrize("shape", ["tube", "helix", "two_rings"])
 def test_clean_and_dense_shapes_agree(shape):
     found = cross_check(samples.SAMPLES[shape](3000).points)
-    assert (found.verdict, found.reasons, found.surface) == ("agrees", (), "ball_pivoting")
-    assert found.rows.one_to_one
+    assert (found.verdict, found.reasons) == ("agrees", ())
     assert found.rows.covered > 0.8
-    assert found.rows.same_rings > 0.5
     assert found.rows.angle["median"] < 0.1
     assert found.skeletons.distance_in_radii < 0.05
-
-
-def test_noise_turns_the_rows_before_it_moves_the_skeleton():
-    found = cross_check(samples.torus(2048, noise=0.0025).points)
-    assert (found.verdict, found.surface) == ("agrees in part", "poisson")
-    assert found.rows.angle["median"] > 15
-    assert found.skeletons.distance_in_radii < 0.1
-    assert len(found.reasons) == 1
-    assert "a quarter of the Laplacian coordinates" in found.reasons[0]
 
 
 def test_it_tells_where_the_cloud_is_noisy():
@@ -54,7 +44,7 @@ def test_it_tells_where_the_cloud_is_noisy():
     found = cross_check(points)
     assert found.verdict == "agrees in part"
     assert found.doubtful[noisy].mean() > 0.5
-    assert found.doubtful[~noisy].mean() < 0.05
+    assert found.doubtful[~noisy].mean() < 0.2
     assert np.nanmedian(found.angle[noisy]) > 10 * np.nanmedian(found.angle[~noisy])
 
 
@@ -63,37 +53,11 @@ def test_it_tells_where_the_cloud_is_noisy():
     ("verdict", "shape", "n", "noise"),
     [
         ("do not trust", "sheet", 1024, 0),
-        ("do not trust", "sauropod", 128, 0),
         ("cannot tell", "torus", 1024, 0.08),
     ],
 )
 def test_too_sparse_too_noisy_or_without_a_curve(verdict, shape, n, noise):
     assert cross_check(samples.SAMPLES[shape](n, noise=noise).points).verdict == verdict
-
-
-def test_the_fit_of_meshes_that_are_known(ring, check):
-    state = RingBuilder()(ring.points)
-    vertices = state.frame.into(check.vertices)
-    whole = mesh_fit(state, vertices, check.faces)
-    assert (whole.far, whole.pieces, whole.parts, whole.torn) == (0, 1, 1, 0)
-    assert whole.open < 0.02
-    cut = np.abs(vertices[check.faces].mean(axis=1)[:, 0]) > 0.1  # a slab of the ring is missing, and so two pieces
-    fit = mesh_fit(state, vertices, check.faces[cut])
-    off = np.abs(vertices[:, 0]) < 0.1 - spacing(vertices)
-    assert (fit.pieces, fit.parts) == (2, 1)
-    assert 0.4 < fit.torn <= 0.5
-    assert off.mean() / 2 < fit.far < off.mean() * 2
-    assert fit.open > whole.open + 0.05
-    apart = np.abs(ring.points[:, 0]) > 0.1
-    fit = mesh_fit(RingBuilder()(ring.points[apart]), vertices, check.faces[cut])
-    assert (fit.pieces, fit.parts, fit.torn) == (2, 2, 0)
-
-
-def test_open_ends_that_the_cloud_has_too_are_not_held_against_a_mesh():
-    tube = samples.tube(2000, capped=False)
-    found = cross_check(tube.points, "ball_pivoting")
-    assert border_lengths(len(found.vertices), found.faces).max() > 12
-    assert found.fit.open < 0.05
 
 
 # -------------------------------------------------------------------------------------------------------- the numbers
@@ -104,7 +68,7 @@ def test_flat_rows_have_one_direction(grid):
     points = np.column_stack([x, y, 0.4 * x])
     state = RingBuilder()(points)
     faces = np.lexsort(state.points[state.point_of_survivor].T[1::-1])[grid(12, 12, 0, 0)]
-    angle, found = compare_rows(state, state.cloud, faces)
+    angle, found = compare_rows(state, faces)
     compared = np.isfinite(angle)
     assert compared.sum() == found.compared > 50
     assert (angle[compared] == 0).mean() > 0.9
@@ -129,7 +93,7 @@ def test_numbers_of_points_fit_the_numbers_of_all(ring, check):
     assert check.rows.covered == compared.sum() / check.rows.closed
     assert (check.doubtful == (~compared | (check.angle > 30))).all()
     told = json.loads(json.dumps(check.to_dict(), allow_nan=False))
-    assert (told["verdict"], told["skeletons"]["loops"], told["rows"]["one_to_one"]) == ("agrees", [1, 1], True)
+    assert (told["verdict"], told["skeletons"]["loops"]) == ("agrees", [1, 1])
     assert told["points"]["not_compared"] == (~compared).sum()
 
 
@@ -140,7 +104,6 @@ def test_units_place_turn_and_order_do_not_matter(ring, check):
     assert moved.verdict == check.verdict
     # ties in Morton order and in the balls' way may fall differently, so not to the last digit
     assert moved.rows.covered == pytest.approx(check.rows.covered, abs=0.03)
-    assert moved.rows.same_rings == pytest.approx(check.rows.same_rings, abs=0.05)
     assert moved.skeletons.distance_in_radii == pytest.approx(check.skeletons.distance_in_radii, abs=0.01)
     scaled = cross_check(8.0 * ring.points)
     np.testing.assert_allclose(scaled.angle, check.angle, atol=1e-4)
@@ -162,29 +125,15 @@ def test_another_pipeline(ring):
 # ---------------------------------------------------------------------------------------------------------- the meshes
 
 
-def test_rows_of_a_mesh_of_other_points(ring, grid):
-    """A fine regular mesh of the same torus: curvature normals are compared, interpolated."""
-    radius, width = np.linalg.norm(ring.nodes[0]), ring.radii[0]
-    u, v = (each.ravel() * 2 * np.pi / m for each, m in zip(np.mgrid[:160, :40], (160, 40), strict=True))
-    out = radius + width * np.cos(v)
-    state = RingBuilder()(ring.points)
-    vertices = state.frame.into(np.stack([out * np.cos(u), out * np.sin(u), width * np.sin(v)], axis=1))
-    angle, found = compare_rows(state, vertices, grid(160, 40, 1, 1))
-    assert (found.one_to_one, found.same_rings, found.covered) == (False, None, 1)
-    assert found.angle["median"] == pytest.approx(np.nanmedian(angle))
-    assert found.angle["median"] < 5
-
-
 def test_rows_beside_a_hole_and_a_fin_are_not_compared(ring):
     state = RingBuilder()(ring.points)
-    vertices, whole = ball_pivoting(state)
+    vertices, whole = state.cloud, ball_pivoting(state)
     hole = vertices[:, 0] > 0.6 * vertices[:, 0].max()
     faces = whole[~hole[whole].any(axis=1)]
     i, j = faces[0, :2]
     fin = [i, j, np.flatnonzero(~hole & ~np.isin(np.arange(len(hole)), faces[:50]))[0]]
-    before, _ = compare_rows(state, vertices, whole)
-    angle, found = compare_rows(state, vertices, np.vstack([faces, [fin]]))
-    assert found.one_to_one
+    before, _ = compare_rows(state, whole)
+    angle, _ = compare_rows(state, np.vstack([faces, [fin]]))
     assert np.isnan(angle[hole]).all()
     assert np.isnan(angle[fin]).all()
     assert np.isnan(angle).sum() < np.isnan(before).sum() + 1.5 * hole.sum() + 20
@@ -192,34 +141,19 @@ def test_rows_beside_a_hole_and_a_fin_are_not_compared(ring):
     np.testing.assert_allclose(angle[kept], before[kept], atol=1e-6)
 
 
-def test_poisson_and_a_single_method(ring):
-    found = cross_check(ring.points, "poisson")
-    assert (found.surface, found.verdict, found.rows.one_to_one) == ("poisson", "agrees", False)
-    noisy = cross_check(samples.torus(1500, noise=0.02).points, "ball_pivoting")
-    assert noisy.surface == "ball_pivoting"
-    assert noisy.rows.covered < 0.7
-
-
-def test_an_unknown_method(ring):
-    with pytest.raises(InvalidParameterError, match="method = 'alpha': must be 'auto' or 'ball_pivoting' or 'poisson'"):
-        cross_check(ring.points, "alpha")
-
-
 # ---------------------------------------------------------------------------------------------------------- the clouds
 
 
-def test_large_clouds_are_thinned_and_the_user_is_told(ring):
-    with pytest.warns(SkeletonWarning, match="1000 of 1500 points .*max_points") as caught:
-        found = cross_check(ring.points, max_points=1000)
+def test_large_clouds_are_thinned_and_the_user_is_told(ring, monkeypatch):
+    monkeypatch.setattr(sys.modules[CrossCheck.__module__], "MOST_POINTS", 1000)
+    spoilt = np.vstack([ring.points, [[np.nan, 0, 0]]])
+    with pytest.warns(SkeletonWarning, match="1000 of 1500 points are checked") as caught:
+        found = cross_check(spoilt, pipeline=pipelines.default().with_options(drop_invalid=True))
     assert caught[0].filename == __file__
-    assert (found.n_input, len(found.points)) == (1500, 1000)
-    assert len(np.unique(found.points, axis=0)) == 1000
-    assert {tuple(point) for point in found.points} <= {tuple(point) for point in ring.points}
+    assert (found.n_input, len(found.points), np.isnan(found.points).any(axis=1).sum()) == (1501, 1001, 1)
+    assert len(np.unique(found.points[:-1], axis=0)) == 1000
+    assert {tuple(point) for point in found.points[:-1]} <= {tuple(point) for point in ring.points}
     assert found.skeletons.loops == (1, 1)
-    assert cross_check(ring.points, max_points=None).n_input == 1500
-    for wrong in (7, 0, 1.5, "all"):
-        with pytest.raises(InvalidParameterError, match="max_points"):
-            cross_check(ring.points, max_points=wrong)
 
 
 def test_points_that_are_not_finite_and_outliers(ring, check):
@@ -231,22 +165,6 @@ def test_points_that_are_not_finite_and_outliers(ring, check):
     found = cross_check(spoilt, pipeline=pipeline)
     assert np.isnan(found.angle[1500:]).all()
     np.testing.assert_allclose(found.angle[:1500], check.angle, atol=1e-3)
-    with pytest.warns(SkeletonWarning):
-        thinned = cross_check(spoilt, pipeline=pipeline, max_points=1000)
-    assert np.isnan(thinned.points).any(axis=1).sum() == 1
-    assert len(thinned.points) == 1001
-
-
-@SPIKY
-def test_where_poisson_fails_the_balls_surface_is_better_than_none():
-    ring = samples.torus(500).points
-    far = np.vstack([ring, ring + [300, 0, 0]])  # cells as wide as a ring
-    found = cross_check(far)
-    assert found.surface == "ball_pivoting"
-    assert found.rows.compared > 200
-    assert found.skeletons.components == (2, 2)
-    with pytest.raises(InvalidCloudError, match="1000 points: poisson"):
-        cross_check(far, "poisson")
 
 
 def test_duplicates_share_their_row(ring, check):
@@ -257,13 +175,7 @@ def test_duplicates_share_their_row(ring, check):
 @SPIKY
 def test_clouds_without_a_surface():
     line = np.column_stack([np.linspace(0, 1, 50), np.zeros(50), np.zeros(50)])
-    with pytest.raises(InvalidCloudError, match="50 points"):
-        cross_check(line, "ball_pivoting")
-    found = cross_check(np.column_stack([np.linspace(0, 1, 500), np.zeros((500, 2))]))  # Poisson invents one
-    assert found.rows.compared == 0
-    assert found.verdict == "cannot tell"
-    assert "no Laplacian coordinates could be compared" in found.reasons
-    for wrong in (np.eye(3), np.empty((0, 3))):
+    for wrong in (line, np.eye(3), np.empty((0, 3))):
         with pytest.raises(InvalidCloudError):
             cross_check(wrong)
 

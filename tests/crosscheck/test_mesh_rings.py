@@ -1,21 +1,10 @@
 """One-rings of meshes, manifold or not."""
 
 import numpy as np
-import pytest
 
-from glsk_o3d.crosscheck.mesh_rings import clean_faces, common_share, umbrellas
-from glsk_o3d.numerics.rings import Rings
+from glsk_o3d.crosscheck.mesh_rings import clean_faces, umbrellas
 
 OCTAHEDRON = np.array([[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]])
-
-
-def rings_of(*lists, closed=True):
-    indptr = np.concatenate([[0], np.cumsum([len(row) for row in lists])]).astype(int)
-    return Rings(indptr, np.array([j for row in lists for j in row], int), np.full(len(lists), closed))
-
-
-def octahedron_rings(first=(2, 4, 3, 5)):
-    return rings_of(first, [2, 5, 3, 4], [0, 5, 1, 4], [0, 4, 1, 5], [0, 2, 1, 3], [0, 3, 1, 2])
 
 
 def test_triangles_without_area_and_repeated_ones_go():
@@ -35,23 +24,3 @@ def test_what_is_no_umbrella():
     assert np.flatnonzero(~umbrellas(7, fin)).tolist() == [0, 4, 6]
     twins = np.vstack([OCTAHEDRON, np.where(OCTAHEDRON == 4, 4, OCTAHEDRON + 6)])  # two of them that touch in vertex 4
     assert np.flatnonzero(~umbrellas(12, twins)).tolist() == [4, 10]
-
-
-@pytest.mark.parametrize("first", [(2, 4, 3, 5), (3, 5, 2, 4), (5, 3, 4, 2)])
-def test_a_ring_is_the_same_wherever_it_starts_and_whichever_way_it_runs(first):
-    assert common_share(octahedron_rings(first), OCTAHEDRON).tolist() == [1] * 6
-
-
-def test_the_same_neighbours_in_another_order_are_another_ring():
-    # 2-3-4-5 shares the triangles (3, 4) and (5, 2) with 2-4-3-5; each has two more
-    assert common_share(octahedron_rings((2, 3, 4, 5)), OCTAHEDRON).tolist() == [2 / 6, 1, 1, 1, 1, 1]
-
-
-def test_missing_and_additional_neighbours():
-    # without 5: the triangles (2, 4), (4, 3) of four, and (3, 2) that is not there
-    assert common_share(octahedron_rings((2, 4, 3)), OCTAHEDRON)[0] == 2 / 5
-    fan = octahedron_rings()
-    open_fan = Rings(fan.indptr, fan.indices, np.array([False] + [True] * 5))
-    assert common_share(open_fan, OCTAHEDRON)[0] == 3 / 4
-    assert common_share(octahedron_rings(), OCTAHEDRON[:0]).tolist() == [0] * 6
-    assert common_share(rings_of([], closed=False), OCTAHEDRON[:0]).tolist() == [0]

@@ -96,15 +96,6 @@ def test_without_extras(bare, tmp_path):
 COMMAND = "from glsk_o3d.cli.main import app; app(sys.argv[1:])"
 
 
-def test_the_demo_leaves_out_its_picture(bare, tmp_path):
-    done = bare(COMMAND, "demo", "-n", "1200")
-    assert done.returncode == 0
-    assert done.stderr.count("\n") == 1
-    assert "no skeleton.png: " in done.stderr
-    assert done.stderr.endswith('pip install "glsk-o3d[pictures]"\n')
-    assert {path.name for path in (tmp_path / "demo").iterdir()} == {"cloud.ply", "skeleton.ply", "skeleton.json"}
-
-
 def test_the_command_asks_before_the_work(bare, tmp_path):
     (tmp_path / "scan.xyz").write_text("0 0 0\n")  # not looked at: what cannot be written comes first
     done = bare(COMMAND, "skeletonize", "scan.xyz", "-o", "s.ply", "--preview", "s.png")

@@ -102,7 +102,7 @@ def test_a_sample_of_another_size_and_of_some_points(scans, points):
             read_sample(scans / "scan.ply", n=n)
 
 
-def test_points_that_are_not_finite(tmp_path, points):
+def test_points_that_are_not_finite(tmp_path, points, monkeypatch):
     spoilt, path = points.copy(), tmp_path / "c.ply"
     spoilt[20000:20010] = np.nan
     save(spoilt, path)
@@ -110,7 +110,8 @@ def test_points_that_are_not_finite(tmp_path, points):
         read_sample(path)
     pipeline = pipelines.default().with_options(drop_invalid=True)
     whole = pipeline(read_cloud(path))
-    found = pipeline(streaming.sample_for(pipeline, path, stream=True))
+    monkeypatch.setattr(streaming, "LARGE_CLOUD", N - 1)
+    found = pipeline(streaming.sample_for(pipeline, path))
     for report in (whole.report, found.report):
         assert (report.n_input, report.n_dropped) == (N, 10)
     assert found.report.n_sampled == whole.report.n_sampled == len(found.points) - 1
@@ -133,14 +134,10 @@ def test_large_files_are_sampled_and_others_are_read(scans, monkeypatch):
     path, sample_for = scans / "scan.ply", streaming.sample_for
     n = (read_tensor_cloud(path).point.classification.numpy() == 5).sum()
     assert sample_for(pipelines.default(), path) is None
-    assert sample_for(pipelines.default(), path, stream=True) is not None
     monkeypatch.setattr(streaming, "LARGE_CLOUD", N - 1)
     sample = sample_for(pipelines.default(), path, "classification == 5")
     assert int(sample.point.sample_count.numpy().sum()) == n < N
-    assert sample_for(pipelines.default(), path, stream=False) is None
     assert sample_for(pipelines.wen2024(), path) is None
-    with pytest.raises(InvalidParameterError, match="takes all points"):
-        sample_for(pipelines.wen2024(), path, stream=True)
 
 
 # -------------------------------------------------------------------------------------------------------------- labels

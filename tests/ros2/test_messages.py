@@ -116,17 +116,6 @@ def test_markers_show_edges_vertices_and_junctions(skeleton, make_message, heade
         assert marker.scale.x == marker.scale.y == marker.scale.z > 0
 
 
-def test_every_branch_has_a_colour_of_its_own(tree, make_message, header):
-    edges, vertices = markers_of(tree, header, make_message).markers[1:3]
-    color_of = {}
-    for i, edge in enumerate(tree.edges):
-        (row,) = [row for row, path in enumerate(tree.branches) if set(edge) <= set(path)]
-        color_of.setdefault(row, set()).update((c.r, c.g, c.b) for c in edges.colors[2 * i : 2 * i + 2])
-    assert [len(colors) for colors in color_of.values()] == [1, 1, 1]
-    assert len(set.union(*color_of.values())) == 3
-    assert {(c.r, c.g, c.b) for c in vertices.colors} == set.union(*color_of.values())
-
-
 # --------------------------------------------------------------------------------------------------------------- poses
 
 

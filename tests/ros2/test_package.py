@@ -1,7 +1,6 @@
 """What colcon and ros2 launch find: setup.py, package.xml and the launch file, with stand-ins for what they import."""
 
 import ast
-import importlib
 import runpy
 import sys
 from types import ModuleType, SimpleNamespace
@@ -40,14 +39,6 @@ def test_setup_installs_what_ament_looks_for(package, facts, installed):
     assert where[f"share/{name}/launch"] == [f"launch/{path.name}" for path in (package / "launch").glob("*.py")]
     assert all((package / file).is_file() for files in where.values() for file in files)
     assert f"$base/lib/{name}\n" in (package / "setup.cfg").read_text()  # where ros2 run looks
-
-
-def test_the_script_of_the_node_is_there(ros, installed):
-    ros.node()
-    ((script, _, place),) = (line.partition(" = ") for line in installed["entry_points"]["console_scripts"])
-    module, _, function = place.partition(":")
-    assert script == "skeletonize_node"
-    assert callable(getattr(importlib.import_module(module), function))
 
 
 def test_package_xml_names_all_that_is_imported(package, facts):

@@ -161,11 +161,11 @@ def score(
 ) -> None:
     """Score the answers of a program. What is missing or unreadable counts as a failure."""
     with reporting(quiet=quiet, verbose=verbose):
-        from glsk_o3d.cli.outputs import check_outputs, json_output
+        from glsk_o3d.cli.outputs import Output, check_outputs
 
-        from . import leaderboard, score_answers
+        from . import Results, leaderboard, score_answers
 
-        check_outputs([json_output(output)])
+        check_outputs([Output(output, (".json",), "report is JSON", Results.save)])
         with progress(remaining=True) as update:
             update("reading")
             results = score_answers(folder, answers, name=name, on_cloud=update)
@@ -224,12 +224,13 @@ def repeat(
 ) -> None:
     """Compare the answers to several clouds of each object with each other. What is missing counts as a failure."""
     with reporting(quiet=quiet, verbose=verbose):
-        from glsk_o3d.cli.outputs import check_outputs, json_output
+        from glsk_o3d.cli.outputs import Output, check_outputs
 
+        from . import Repeat
         from . import repeat as compare_answers
 
         files = [] if output is None else [output]
-        check_outputs([json_output(output)])
+        check_outputs([Output(output, (".json",), "report is JSON", Repeat.save)])
         with progress(remaining=True) as update:
             update("reading")
             found = compare_answers(folder, answers, name=name, on_object=update)
