@@ -78,15 +78,14 @@ class Builtin:
         return kind(*map(int, text.split(","))) if kind is pymeshlab.Color else kind(text)
 
 
-def slots(filter: str, any_filter: bool = False) -> dict[str, Builtin]:
+def slots(filter: str) -> dict[str, Builtin]:
     """The parameters of a filter by pymeshlab's name, as `pythonic` has their names.
 
-    Filters that do not work on layers are refused without `any_filter`, by a ValueError.
+    Filters that do not work on layers are refused by a ValueError.
     """
-    if not (any_filter or filter.startswith(ON_LAYERS)):
+    if not filter.startswith(ON_LAYERS):
         raise ValueError(
-            "it writes or reads files, or sends them: scripts run only filters that work on layers, unless "
-            "any_filter=True says that this one is trusted"
+            "it writes or reads files, or sends them: scripts run only filters that work on layers; call it in Python"
         )
     if filter not in require("pymeshlab").filter_list():
         raise ValueError("the pymeshlab that is installed has no such filter")

@@ -116,12 +116,7 @@ def test_the_command_asks_before_the_work(bare, tmp_path):
 PYMESHLAB = 'pymeshlab cannot be imported: pip install "glsk-o3d[meshlab]"\n'
 
 
-def test_a_filter_script_says_at_once_what_it_needs(bare, root):
+def test_a_filter_script_says_at_once_what_it_needs(bare):
     assert bare(COMMAND, "run", "--list").returncode == 0
-    script = root / "filters" / "scan_cleanup.mlx"
-    theirs = re.findall(r'<filter name="([^"]+)"', script.read_text())
     done = bare(COMMAND, "run", "scan_cleanup", "nowhere.ply", "-o", "c.ply")  # the scan is not looked at
-    assert done.returncode == 1
-    assert done.stderr.startswith(f"glsk: error: {script}: MeshLab's own filters ")
-    assert done.stderr.endswith(PYMESHLAB)
-    assert re.findall(r"'([^']+)' \(line \d+\)", done.stderr) == theirs
+    assert (done.returncode, done.stderr) == (1, f"glsk: error: {PYMESHLAB}")
