@@ -16,7 +16,6 @@ from ..interop.clouds import cloud_points
 from ..interop.packages import require
 from ..io.formats import ply
 from ..io.formats.graphs import graph_skeleton
-from ..io.paths import existing_file
 from ..io.scan import COLOR_CHANNELS
 from ..io.scans import read_scan
 from ..io.skeletons import save_skeleton, skeleton_ending
@@ -55,7 +54,6 @@ class Layer:
     @classmethod
     def read(cls, path: str | os.PathLike) -> Layer:
         """A scan that `read_cloud` reads, with the faces of a mesh and the quality of points."""
-        path = existing_file(path)
         scan = read_scan(path)
         colors = scan.colors
         return cls(
@@ -64,7 +62,7 @@ class Layer:
             normals=scan.normals,
             scalars=scan.attributes["quality"].astype(float) if "quality" in scan.attributes else None,
             colors=None if colors is None else np.column_stack([colors, np.ones(len(colors))]),
-            label=path.name,
+            label=Path(path).name,
         )
 
     @classmethod

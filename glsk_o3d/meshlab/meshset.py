@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FileFormatError, GlskError, InvalidCloudError, InvalidParameterError, did_you_mean, in_words
+from ..errors import GlskError, InvalidCloudError, InvalidParameterError, did_you_mean
 from ..interop.packages import require
-from ..io.paths import SCAN_ENDINGS, existing_file
 from ..io.skeletons import FORMATS
 from ..skeleton import Skeleton
 from . import builtin
@@ -191,20 +190,12 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         return layer.to_skeleton()
 
     def load_scan(self, path: str | os.PathLike) -> None:
-        """Add a scan from a file as a new layer, by `read_cloud` as in ``glsk run`` or else by MeshLab.
+        """Add a scan that `read_cloud` reads as a new layer, with the faces of a mesh and the quality of points.
 
-        FileNotFoundError or FileFormatError without points. `load_new_mesh` also has colours of faces and textures.
+        `load_new_mesh` reads MeshLab's formats, with textures and colours of faces.
         """
-        path = existing_file(path)
-        if path.suffix.lower() in SCAN_ENDINGS:
-            self.add_mesh(Layer.read(path).to_pymeshlab(), path.name)
-            return
-        try:
-            self.load_new_mesh(str(path))
-        except pymeshlab.PyMeshLabException as error:
-            raise FileFormatError(f"{path}: MeshLab cannot read it: {in_words(error)}") from error
-        if not self.current_mesh().vertex_number():
-            raise FileFormatError(f"{path}: no points could be read")
+        layer = Layer.read(path)
+        self.add_mesh(layer.to_pymeshlab(), layer.label)
 
     def save_current_mesh(self, file_name: str | os.PathLike, *args: Any, **kwargs: Any) -> None:
         """Write the current layer as pymeshlab; without options a layer of vertices and edges by `save_skeleton`.
@@ -216,11 +207,6 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
             self.layer().save(file_name)
         else:
             super().save_current_mesh(os.fspath(file_name), *args, **kwargs)
-
-    def clear(self) -> None:
-        """Remove all layers. The current script stays."""
-        super().clear()
-        self._made = {}
 
 
 def _known(name: Any) -> str:

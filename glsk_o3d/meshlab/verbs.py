@@ -58,8 +58,6 @@ class Slot:
         value = _plain(value)
         if value == "none" and "none" in self.words:
             return None
-        if self.kind == "choice" and type(value) is int and 0 <= value < len(self.words):
-            value = self.words[value]
         if self.kind in PARTS and isinstance(value, str):
             if value not in self.words:
                 raise ValueError(did_you_mean(value, self.words, self.kind))

@@ -140,7 +140,6 @@ def test_the_plan_writes_nothing(scene, batch, tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (dict(tiles=-1), "tiles = -1: must be above 0"),
         (dict(tiles=1.0, overlap=0.5), "at most a quarter"),
         (dict(overlap=0.1), "needs tiles: give their size, too"),
         (dict(tiles=1.0, pipeline="tree"), "makes one tree of all in a tile"),

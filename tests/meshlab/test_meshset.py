@@ -277,17 +277,6 @@ def test_scalars_of_a_skeleton_are_its_radii_and_moved_vertices_its_own(meshes, 
     assert len(moved.points) == 0
 
 
-def test_layers_that_are_gone_are_forgotten(meshes):
-    meshes.generate_curve_skeleton_glsk()
-    skeleton = meshes.mesh(1)
-    again = pymeshlab.Mesh(skeleton.vertex_matrix(), edge_matrix=skeleton.edge_matrix())
-    meshes.clear()
-    assert meshes.mesh_number() == 0
-    meshes.add_points(POINTS)
-    meshes.add_mesh(again)  # as layer 1 was, but nobody says from where
-    assert meshes.layer().skeleton is None
-
-
 # ---- what there is
 
 

@@ -151,7 +151,7 @@ def test_our_values_survive_a_script(tmp_path):
         "contractor_stop": "RingSizeRatio",
         "ringsizeratio_threshold": 1 / 3,
         "connector_radius": "2.5%",
-        "connector_links": 1,
+        "connector_links": "nearest",
     }
     write_script(tmp_path / "s.mlx", [step(verb, values).call])
     assert 'type="RichAbsPerc" name="connector_radius" value="2.5%"' in (tmp_path / "s.mlx").read_text()
