@@ -20,14 +20,6 @@ except ImportError:  # Windows
 Row = dict[str, Any]
 DONE, FAILED, STARTED = "done", "failed", "started"
 LOCK_FILE = ".ledger.lock"
-LEDGER_COLUMNS = (
-    *("name", "input", "status", "error", "seconds", "points", "dropped", "sampled", "outliers"),
-    *("distinct", "contracted", "vertices", "edges", "components", "loops", "leaves", "junctions", "length"),
-    *("loops_closed", "cuts", "bridges", "uncertain", "seams", "unmatched"),
-    *("iterations", "converged", "stop_reason", "warnings", "messages", "parameters", "input_hash"),
-    *("outputs", "worker", "version", "finished"),
-)
-"""What a row tells."""
 _log = logging.getLogger(__name__)
 
 

@@ -16,7 +16,7 @@ from ..errors import BatchError, InvalidParameterError
 from ..interop.atomic import write_json
 from ..numerics.cores import cores
 from ..parameters import check_number
-from .ledger import DONE, FAILED, LEDGER_COLUMNS, LOCK_FILE, STARTED, Row, locked, refuse_ways_out
+from .ledger import DONE, FAILED, LOCK_FILE, STARTED, Row, locked, refuse_ways_out
 from .plan import RECIPE_FILE, TILES_FOLDER, UP_TO_DATE, Plan, plan_batch
 from .tasks import Task, failure, in_one_line, work
 from .workers import DaskWorkers, LocalWorkers, Workers, died
@@ -226,8 +226,7 @@ class _Run:
             self._on_result(row)
 
     def _add(self, task: Task, row: Row) -> Row:
-        row = {"parameters": self._plan.parameters} | row | {"name": task.name, "input": task.source}
-        row = {name: row[name] for name in LEDGER_COLUMNS if name in row}
+        row = {"parameters": self._plan.parameters, **row, "name": task.name, "input": task.source}
         self._plan.ledger.add(row)
         return row
 

@@ -72,7 +72,6 @@ def failure(error: str) -> Row:
 
 
 def _skeletonize(task: Task, row: Row, messages: list[str]) -> None:
-    row |= {"seams": None, "unmatched": None}
     if task.needs:
         skeleton = _joined(task, row)
     elif task.is_tile:
