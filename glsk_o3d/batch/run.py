@@ -19,13 +19,12 @@ from ..parameters import check_number
 from .ledger import DONE, FAILED, LOCK_FILE, STARTED, Row, locked, refuse_ways_out
 from .plan import RECIPE_FILE, TILES_FOLDER, UP_TO_DATE, Plan, plan_batch
 from .tasks import Task, failure, in_one_line, work
-from .workers import DaskWorkers, LocalWorkers, Workers, died
+from .workers import CONNECTION_LOST, DaskWorkers, LocalWorkers, Workers, died
 
 if TYPE_CHECKING:
     import distributed
 
 _POLL_SECONDS = 0.2  # seconds until Ctrl-C is noticed on Windows, and workers that have come or gone
-CANCELLED = "the work was cancelled, or its scheduler has gone: run the same batch to go on"
 WORKER_DIED = "the worker died with it, also alone: out of memory, or a crash in native code"
 
 
@@ -202,7 +201,7 @@ class _Run:
         """Put what came of tasks into the ledger; BatchError, in the end, where there is nobody to work any more."""
         gone, lost = None, []
         for future, task in ended.items():
-            error = BatchError(CANCELLED) if future.cancelled() else future.exception()
+            error = BatchError(CONNECTION_LOST) if future.cancelled() else future.exception()
             if isinstance(error, BatchError):
                 gone = error
             elif died(error):

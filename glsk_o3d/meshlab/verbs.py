@@ -23,11 +23,6 @@ RICH_TYPES = {"bool": "RichBool", "int": "RichInt", "float": "RichFloat", "lengt
 """What scripts call the types of parameters; others are words, RichString."""
 
 
-def facts_of(doc: str, type: str, choices: tuple[str, ...] = (), low: float | None = None) -> Mapping[str, Any]:
-    """The facts of a parameter that is no filter's."""
-    return parameter(None, doc, type=type, choices=choices, low=low).metadata
-
-
 @dataclass(frozen=True)
 class Slot:
     """A parameter of a verb, with the facts that `glsk_o3d.parameters.parameter` makes.
@@ -192,7 +187,7 @@ def verbs() -> dict[str, Verb]:
         "The points that a skeleton was made from, with the branch that each belongs to as scalar and as colour. "
         "On a layer without skeleton the default pipeline makes one first. Faces are kept."
     )
-    layer = Slot("layer", facts_of("The layer to act on; -1 is the current one.", "int", low=-1))
+    layer = Slot("layer", parameter(None, "The layer to act on; -1 is the current one.", type="int", low=-1).metadata)
     slots = {slot.name: slot for slot in (*_slots_of_all(), layer)}
     found = [
         Verb("generate_curve_skeleton_glsk", whole, slots, "skeleton"),
@@ -204,7 +199,7 @@ def verbs() -> dict[str, Verb]:
 def _slots_of_all() -> list[Slot]:
     """The name of a pipeline, and the parameters of all filters that are in one, or may be."""
     about = "The named pipeline; parameters that are not given are as it has them."
-    choice = facts_of(about, "choice", tuple(known_pipelines()))
+    choice = parameter(None, about, type="choice", choices=tuple(known_pipelines())).metadata
     inside = [type(part) for make in known_pipelines().values() for part in parts(make())]
     inside += [cls for cls in catalogue().values() if any(serves(cls, kind) for kind in PARTS)]
     prefixed = (

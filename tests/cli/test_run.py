@@ -45,23 +45,6 @@ def test_a_script_of_ours_is_the_pipeline(invoke, scans, script, tmp_path):
     np.testing.assert_array_equal(read_skeleton(tmp_path / "s.ply").edges, expected.edges)
 
 
-def test_a_mixed_script_is_what_meshset_does(invoke, scans, tmp_path):
-    result = invoke("run", "scan_cleanup_then_skeleton", scans / "sample.ply", "-o", "s.json", "--json")
-    assert result.exit_code == 0, result.stderr
-    told = json.loads(result.stdout)
-    names = ["Select Outliers", "Delete Selected Vertices", "Generate Curve Skeleton (GLSkeleton)"]
-    assert [step["filter"] for step in told["steps"]][1:] == names
-    meshes = glsk_o3d.MeshSet()
-    meshes.load_new_mesh(str(scans / "sample.ply"))
-    meshes.load_filter_script(scripts()["scan_cleanup_then_skeleton"])
-    meshes.apply_filter_script()
-    back, expected = read_skeleton(tmp_path / "s.json"), meshes.current_skeleton()
-    np.testing.assert_array_equal(back.vertices, expected.vertices)
-    np.testing.assert_array_equal(back.edges, expected.edges)
-    assert told["steps"][-1]["result"]["vertices"] == len(expected.vertices)
-    assert len(back.points) < 1100
-
-
 def test_the_cross_check_measures_and_writes_nothing(invoke, scans, tmp_path):
     result = invoke("run", "mesh_crosscheck", scans / "ring.ply", "--json")
     assert result.exit_code == 0, result.stderr
