@@ -21,7 +21,6 @@ from glsk_o3d.io.formats.fields import FORMAT, FORMAT_VERSION, dumps
 from glsk_o3d.io.skeletons import FORMATS
 from glsk_o3d.resampling import with_support
 from glsk_o3d.skeleton import ARRAYS
-from glsk_o3d.viewing.html import to_html
 
 RARE = 0.1  # share of the cases in which what takes long is done
 NUMBERS = (math.nan, math.inf, -math.inf, -1.0, -0.0, 0.0, 5e-324, 1e-160, 0.5, 1.5, 1e149, 1e155, 1e308)
@@ -254,7 +253,6 @@ USES: tuple[Callable[[Skeleton, Path], object], ...] = (
 """What is public and fast."""
 SLOW: tuple[Callable[[Skeleton, Path], object], ...] = (
     _page,
-    lambda it, _: to_html(it),
     lambda it, folder: glsk.save_preview(it, folder / "p.png"),
     lambda it, _: plt.close(glsk.plot_skeleton(it, color="radius").figure),
     lambda it, folder: glsk.save_rig(it, folder / "r.glb", cut_loops=True),

@@ -49,7 +49,7 @@ from .state import Contraction
 from .stopping import ExplainedScore, RingSizeRatio
 from .thinner import Thinner
 from .tracer import Tracer
-from .viewing.page import ContractionRecorder, save_report
+from .viewing.page import save_report
 from .viewing.plot import plot_skeleton
 from .viewing.preview import save_preview
 
@@ -60,7 +60,6 @@ __all__ = [
     "Cloud",
     "Connector",
     "Contraction",
-    "ContractionRecorder",
     "Contractor",
     "Decision",
     "Denoiser",

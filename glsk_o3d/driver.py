@@ -43,7 +43,7 @@ def skeletonize(
     on_iteration : callable, optional
         Called with the IterationRecord of each solve; return False to stop the contraction there.
     on_state : callable, optional
-        Called before `on_iteration` with the Contraction after each solve, such as a `ContractionRecorder`.
+        Called before `on_iteration` with the Contraction after each solve.
     **options
         Parameters of the filters, by name. If more than one filter has the name, give a mapping,
         ``{"Connector.radius": "2%"}``: as `pipeline` for ``"default"``, else to `Pipeline.with_options`.

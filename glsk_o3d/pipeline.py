@@ -167,7 +167,7 @@ class Pipeline(Generic[Produced]):
         on_iteration : callable, optional
             Called with the IterationRecord of each solve; return False to stop the contraction there.
         on_state : callable, optional
-            Called before it with the Contraction after each solve, such as a `ContractionRecorder`.
+            Called before it with the Contraction after each solve.
         on_stage : callable, optional
             Called with each filter before it runs.
 

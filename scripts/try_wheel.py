@@ -27,7 +27,7 @@ info s.json
 skeletonize demo/cloud.ply --pipeline tree -o t.json
 skeletonize demo/cloud.ply -o r.json --preview r.png --report r.html
 batch demo/cloud.ply -o many
-batch scan.csv -o trees --by tree
+skeletonize scan.csv -o tree.ply --where tree==1
 branches s.json -o branches.csv
 tree t.json --unit m -o cylinders.csv
 grasps s.json --opening 0.3 -o grasps.json

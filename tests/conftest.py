@@ -6,6 +6,7 @@ import os
 import shutil
 import sys
 import textwrap
+from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import fields, replace
 from pathlib import Path
@@ -405,3 +406,27 @@ def flat_bar():
         return Skeleton(vertices, edges, np.full(41, 0.3), owner, points, normals)
 
     return make
+
+
+@pytest.fixture
+def at_once(monkeypatch):
+    """Do the work of batches in this process; gives how many workers were asked for."""
+    counts = []
+
+    class Here:
+        def __init__(self, count):
+            counts.append(count)
+
+        def capacity(self):
+            return 2
+
+        def submit(self, function, task):
+            future = Future()
+            future.set_result(function(task))
+            return future
+
+        def close(self, *, at_once):
+            pass
+
+    monkeypatch.setattr("glsk_o3d.batch.run.LocalWorkers", Here)
+    return counts

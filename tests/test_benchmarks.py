@@ -3,7 +3,6 @@
 import json
 import re
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from itertools import chain
 
 import numpy as np
@@ -181,11 +180,12 @@ def test_cross_checks(benchmark):
 
 
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")  # the work is done in this process
+@pytest.mark.usefixtures("at_once")
 def test_scans_for_batches(benchmark, tmp_path):
     (tmp_path / "in").mkdir()
-    with benchmark("batch") as batch, ThreadPoolExecutor(1) as pool:
+    with benchmark("batch") as batch:
         batch.make_scans(tmp_path / "in", 3, 256, 400)
-        result = run_batch(tmp_path / "in", tmp_path / "out", executor=pool)
+        result = run_batch(tmp_path / "in", tmp_path / "out")
     failed = {name[5:] for name, row in result.rows.items() if row["status"] == "failed"}
     assert failed == {name.partition(".")[0] for name in batch.CORRUPT}
     assert all(256 <= row["points"] <= 400 for row in result.rows.values() if row["status"] == "done")

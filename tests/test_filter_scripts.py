@@ -1,16 +1,12 @@
 """The scripts in filters/ run at every scale, do what their table says, and are all documented."""
 
 import re
-import sys
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import glsk_o3d
-from glsk_o3d import editing, samples
-from glsk_o3d.cli.main import app
-from glsk_o3d.meshlab.layers import Layer
+from glsk_o3d import samples
 from glsk_o3d.meshlab.script import comment
 from glsk_o3d.meshlab.steps import read_steps, scripts
 from glsk_o3d.meshlab.verbs import verbs
@@ -57,33 +53,11 @@ def test_scripts_with_ours_fit_every_scale(name):
     assert found[1] == pytest.approx(found[0], rel=1e-3)
 
 
-def test_the_skeleton_of_limbs_has_no_twigs_and_few_vertices(tmp_path, monkeypatch):
-    points = samples.tree(3000).points
-    Layer.of(points).save(tmp_path / "scan.ply")
-    monkeypatch.setitem(sys.modules, "pymeshlab", None)
-    words = ["run", "skeleton_of_limbs", str(tmp_path / "scan.ply"), "-o", str(tmp_path / "s.json")]
-    assert CliRunner().invoke(app, words).exit_code == 0
-    found, whole = glsk_o3d.read_skeleton(tmp_path / "s.json"), glsk_o3d.skeletonize(points)
-    limbs = editing.prune(whole, length=0.1 * np.linalg.norm(np.ptp(whole.vertices, axis=0)))
-    assert 2 < len(found.leaves) == len(limbs.leaves) < len(whole.leaves)
-    assert len(found.vertices) < len(limbs.vertices) / 4
-
-
-def test_the_skeleton_of_limbs_is_the_script_of_its_page(root, tmp_path):
-    (text,) = re.findall(r"```xml\n(.*?)```", (root / "docs" / "editing.md").read_text(), re.DOTALL)
-    (tmp_path / "page.mlx").write_text(text)
-    shown, shipped = (read_steps(path) for path in (tmp_path / "page.mlx", scripts()["skeleton_of_limbs"]))
-    assert [(one.name, one.values) for one in shown] == [(one.name, one.values) for one in shipped]
-
-
 @pytest.mark.parametrize("name", scripts())
 def test_every_script_has_a_comment_and_is_documented(root, name):
     assert len(comment(scripts()[name])) > 40
     assert f"`{name}.mlx`" in (root / "filters" / "README.md").read_text()
     assert f"\n### {name}\n" in (root / "docs" / "meshlab.md").read_text()
-    needs = any(step.verb is None for step in read_steps(scripts()[name]))
-    said = re.search(rf"`{name}.mlx` .*\| (yes|no) \|", (root / "filters" / "README.md").read_text())[1]
-    assert said == ("yes" if needs else "no")
 
 
 def test_the_page_says_what_is_so(root, tmp_path):

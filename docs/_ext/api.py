@@ -57,7 +57,6 @@ NAMES = {
     },
     "viewing": {
         "Pictures and pages": ("plot_skeleton", "save_preview", "save_report"),
-        "What happened on the way": ("ContractionRecorder",),
     },
     "analysis": {
         "Branches": ("branch_table", "BranchTable", "segment"),

@@ -351,13 +351,13 @@ def hull():
 
 def contraction():
     points = animal()
-    recorder = glsk.ContractionRecorder()
-    (glsk.pipelines.rings() | glsk.Contractor(reducer=glsk.LPRReducer()))(points, on_state=recorder)
-    left = [len(points), *(len(np.unique(places, axis=0)) for places in recorder.positions[1:])]
-    shown = range(len(recorder.positions))
+    states = []
+    (glsk.pipelines.rings() | glsk.Contractor(reducer=glsk.LPRReducer()))(points, on_state=states.append)
+    left = [len(points), *map(len, states)]
+    shown = range(len(left))
     titles = [f"solve {t}: {left[t]} points" if t else f"the scan: {left[0]} points" for t in shown]
     figure, axes = panels(titles, 0.8, columns=3)
-    for each, places in zip(axes, recorder.positions, strict=False):
+    for each, places in zip(axes, [points, *(state.contracted for state in states)], strict=False):
         dots(each, places, INK, 1.5)
     same_scale(axes[: len(titles)])
     return figure

@@ -16,12 +16,19 @@ import glsk_o3d as glsk
 from glsk_o3d.samples import sample_object
 
 # %%
-# A recorder keeps where each point is after each solve. A point that was merged into another stands where that
-# stands.
+# ``on_state`` tells where each point is after each solve; every second is followed here. A point that was merged into
+# another stands where that stands.
 
-recorder = glsk.ContractionRecorder(most_points=4000)
-skeleton = glsk.skeletonize(sample_object(8192).points, on_state=recorder)
-solves = len(recorder.positions) - 1
+cloud = sample_object(8192).points
+positions = [cloud[::2]]
+
+
+def keep(state):
+    positions.append(state.contracted[state.survivor_of_point[::2]])
+
+
+skeleton = glsk.skeletonize(cloud, on_state=keep)
+solves = len(positions) - 1
 print(f"{solves} solves: {skeleton.report.stop_reason}")
 
 # %%
@@ -31,10 +38,10 @@ print(f"{solves} solves: {skeleton.report.stop_reason}")
 
 figure = plt.figure(figsize=(12, 6), layout="constrained")
 columns = (solves + 3) // 2
-for solve, points in enumerate([*recorder.positions, None]):
+for solve, points in enumerate([*positions, None]):
     axes = figure.add_subplot(2, columns, solve + 1, projection="3d")
     drawn = None if points is not None else skeleton
-    glsk.plot_skeleton(drawn, axes, cloud=recorder.positions[-1] if points is None else points)
+    glsk.plot_skeleton(drawn, axes, cloud=positions[-1] if points is None else points)
     title = "skeleton" if drawn else f"after solve {solve}" if solve else "the cloud"
     axes.set_title(title, fontsize=10)
 plt.show()
@@ -51,7 +58,7 @@ class Film(bytes):
         return f'<img alt="the contraction" src="data:image/gif;base64,{data}">'
 
 
-axes = glsk.plot_skeleton(None, cloud=recorder.positions[0])
+axes = glsk.plot_skeleton(None, cloud=positions[0])
 dots = axes.collections[0]
 steps = [solve + part for solve in range(solves) for part in (0, 0, 0, 0, 0.2, 0.4, 0.6, 0.8)] + [
     solves
@@ -60,7 +67,7 @@ steps = [solve + part for solve in range(solves) for part in (0, 0, 0, 0, 0.2, 0
 
 def draw(step):
     before = int(step)
-    one, other = recorder.positions[before], recorder.positions[min(before + 1, solves)]
+    one, other = positions[before], positions[min(before + 1, solves)]
     dots._offsets3d = (one + step % 1 * (other - one)).T
     axes.set_title(f"solve {before}")
 

@@ -46,8 +46,8 @@ data.classification, data.treeID = np.repeat([2, 5, 5], sizes), np.repeat([0, 17
 data.write(scan)
 
 # %%
-# ``glsk info plot.laz`` lists the attributes; ``glsk batch plot.laz --by treeID -o trees/`` makes a skeleton per tree.
-# Here is one of them. The tensor cloud keeps class and number, and coordinates all their digits.
+# ``glsk info plot.laz`` lists the attributes. Here is one of the trees. The tensor cloud keeps class and number, and
+# coordinates all their digits.
 
 cloud = glsk.read_tensor_cloud(scan, where="classification == 5 and treeID == 17")
 print(cloud)

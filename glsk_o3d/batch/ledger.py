@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BatchError, InvalidParameterError
-from ..interop.atomic import write_atomically, write_csv, writing
+from ..interop.atomic import write_atomically, writing
 
 try:
     import fcntl
@@ -20,28 +20,20 @@ except ImportError:  # Windows
 Row = dict[str, Any]
 DONE, FAILED, STARTED = "done", "failed", "started"
 LOCK_FILE = ".ledger.lock"
-LEDGER_COLUMNS = (
-    *("name", "input", "status", "error", "seconds", "points", "dropped", "sampled", "outliers"),
-    *("distinct", "contracted", "vertices", "edges", "components", "loops", "leaves", "junctions", "length"),
-    *("loops_closed", "cuts", "bridges", "uncertain", "seams", "unmatched"),
-    *("iterations", "converged", "stop_reason", "warnings", "messages", "parameters", "input_hash"),
-    *("outputs", "worker", "version", "finished"),
-)
-"""What a row tells."""
 _log = logging.getLogger(__name__)
 
 
 class Ledger:
-    """The rows of an output folder, by name; in the folder they are ``ledger.jsonl``, and a table in ``ledger.csv``.
+    """The rows of an output folder, by name; in the folder they are ``ledger.jsonl``.
 
     While a batch runs, every row is a line that is added to the end, and the last of a name counts. A process that dies
     may leave half a line: it is passed over.
     """
 
     def __init__(self, folder: Path):
-        self.path, self.table = folder / "ledger.jsonl", folder / "ledger.csv"
+        self.path = folder / "ledger.jsonl"
         self.rows: dict[str, Row] = {}
-        refuse_ways_out(folder, (self.path.name, self.table.name))
+        refuse_ways_out(folder, [self.path.name])
         lines = self.path.read_bytes().splitlines() if self.path.exists() else []
         for number, line in enumerate(lines, 1):
             try:
@@ -64,12 +56,6 @@ class Ledger:
         self.rows[row["name"]] = row
         with writing(self.path), self.path.open("ab") as stream:
             stream.write(_line(row))
-
-    def close(self) -> None:
-        """Write one line per input, and the table."""
-        self.rewrite()
-        cells = ([_cell(row.get(name)) for name in LEDGER_COLUMNS] for row in self.rows.values())
-        write_csv(self.table, LEDGER_COLUMNS, cells)
 
 
 def _checked(row: Any, folder: Path) -> Row:
@@ -95,10 +81,6 @@ def refuse_ways_out(folder: Path, paths: Iterable[str]) -> None:
 
 def _line(row: Row) -> bytes:
     return json.dumps(row).encode() + b"\n"
-
-
-def _cell(value: Any) -> Any:
-    return "; ".join(map(str, value)) if isinstance(value, list) else value
 
 
 def file_hash(path: str | os.PathLike) -> str:

@@ -87,7 +87,6 @@ def plan_batch(
     cut_loops: bool = False,
     recursive: bool = False,
     where: str | None = None,
-    by: str | None = None,
     tiles: float | None = None,
     overlap: float | None = None,
     force: bool = False,
@@ -113,8 +112,6 @@ def plan_batch(
         Take also the clouds in sub-folders.
     where : str, optional
         Take only points for which this holds; see `glsk_o3d.read_cloud`.
-    by : str, optional
-        One skeleton for each value of this attribute of the points, such as ``"treeID"``.
     tiles : float, optional
         Split scenes into tiles of at most this size, in the cloud's units, along every longer axis, and join their
         skeletons into one. For scenes that are too large for one run.
@@ -153,7 +150,7 @@ def plan_batch(
     ('new', ('scan.ply',), 0)
     """
     chosen = as_pipeline(pipeline)
-    recipe, endings, cut = to_recipe(chosen), _endings(formats, preview), _cut(chosen, where, by, tiles, overlap)
+    recipe, endings, cut = to_recipe(chosen), _endings(formats, preview), _cut(chosen, where, tiles, overlap)
     if where is not None:
         parsed(where)
     settings: dict[str, Any] = {"recipe": recipe, "cut_loops": cut_loops, "where": where, "cut": cut and asdict(cut)}
@@ -163,11 +160,13 @@ def plan_batch(
     given = [inputs] if isinstance(inputs, str | os.PathLike) else inputs
     found, left_out = find_inputs(given, out, recursive=recursive)
     common: dict[str, Any] = dict(out_dir=str(out), recipe=recipe, cut_loops=cut_loops, where=where)
-    own = [] if by else endings
-    tasks = [Task(name, str(path), str(path), _outputs(name, own), **common) for path, name in found.items()]
+    tasks = [
+        Task(name, str(path), str(path), tuple(name + ending for ending in endings), **common)
+        for path, name in found.items()
+    ]
     _refuse_to_replace(tasks, ledger, found)  # before scenes are read
     if cut is not None:
-        tasks = _apart(tasks, left_out, cut, endings, split)
+        tasks = [each for task in tasks for each in _tiles_of(task, cut, split)]
         _refuse_to_replace(tasks, ledger, found)
     with ThreadPoolExecutor() as pool:  # a hash takes as long as reading the file
         whys = pool.map(lambda task: "asked for" if force else _why(task, ledger, parameters), tasks)
@@ -192,42 +191,22 @@ def _endings(formats: Sequence[str], preview: bool) -> list[str]:
     return endings
 
 
-def _cut(pipeline: Pipeline, where: str | None, by: str | None, tiles: Any, overlap: Any) -> Cut | None:
+def _cut(pipeline: Pipeline, where: str | None, tiles: Any, overlap: Any) -> Cut | None:
     """How scenes are to be taken apart, if they are."""
     if tiles is None:
         if overlap is not None:
             raise InvalidParameterError(f"overlap = {overlap!r}: needs tiles: give their size, too")
-        return None if by is None else Cut(by=by, where=where)
-    if by is not None:
-        raise InvalidParameterError("by and tiles cannot be combined: give one of them")
+        return None
     stages = list(parts(pipeline))
     if any(getattr(stage, "root", None) is not None for stage in stages):
         raise InvalidParameterError("tiles: the pipeline makes one tree of all in a tile: give one without root")
     tiles, overlap = checked_sizes(tiles, overlap)
     drop_invalid = any(getattr(stage, "drop_invalid", False) for stage in stages)
-    return Cut(tiles=tiles, overlap=overlap, where=where, drop_invalid=drop_invalid)
+    return Cut(tiles, overlap, where, drop_invalid)
 
 
-def _outputs(name: str, endings: Iterable[str]) -> tuple[str, ...]:
-    return tuple(name + ending for ending in endings)
-
-
-def _apart(tasks: list[Task], left_out: dict[str, str], cut: Cut, endings: list[str], split: bool) -> list[Task]:
-    """The tasks of files that are taken apart; what cannot be is left out."""
-    found: list[Task] = []
-    for whole in tasks:
-        try:
-            found += _parts_of(whole, cut, endings, split)
-        except InvalidParameterError as error:
-            left_out[whole.path] = str(error)
-    if not found:
-        path, reason = next(iter(left_out.items()))
-        raise InvalidParameterError(f"{cut}: no input can be split; {path}: {reason}")
-    return found
-
-
-def _parts_of(whole: Task, cut: Cut, endings: list[str], split: bool) -> list[Task]:
-    """A task for each part of a file, and after tiles one for the whole; one for a file that cannot be taken apart."""
+def _tiles_of(whole: Task, cut: Cut, split: bool) -> list[Task]:
+    """A task for each tile of a file, and after them one for the whole; one for a file that cannot be taken apart."""
     path, folder = Path(whole.path), Path(whole.out_dir, PARTS_FOLDER, whole.name)
     refuse_ways_out(Path(whole.out_dir), [f"{PARTS_FOLDER}/{whole.name}"])
     try:
@@ -238,26 +217,22 @@ def _parts_of(whole: Task, cut: Cut, endings: list[str], split: bool) -> list[Ta
         made = known_split(folder, of) or (divide(path, folder, cut, of) if split else None)
     except (FileFormatError, InvalidCloudError):
         made = None
+    except InvalidParameterError as error:
+        raise InvalidParameterError(f"{path}: {error}") from None
     if made is None:
         return [whole]
     tasks = []
     for label in made.labels:
-        part = replace(whole, source=f"{path} {cut.words(label)}", path=str(folder / f"{label}.ply"), where=None)
-        if made.grid is None:
-            name = f"{whole.name}-{label}"
-            tasks.append(replace(part, name=name, outputs=_outputs(name, endings)))
-        else:
-            name = f"{whole.name}{TILES_FOLDER}{label}"
-            tasks.append(replace(part, name=name, outputs=(name + TILE_ENDING,), is_tile=True))
-    if made.grid is not None:
-        tasks.append(replace(whole, path=str(folder / PARTS_FILE), needs=tuple(task.name for task in tasks)))
-    return tasks
+        name, source = f"{whole.name}{TILES_FOLDER}{label}", f"{path} tile {label}"
+        facts: dict[str, Any] = dict(path=str(folder / f"{label}.ply"), outputs=(name + TILE_ENDING,), where=None)
+        tasks.append(replace(whole, name=name, source=source, is_tile=True, **facts))
+    return [*tasks, replace(whole, path=str(folder / PARTS_FILE), needs=tuple(task.name for task in tasks))]
 
 
 def _refuse_to_replace(tasks: Sequence[Task], ledger: Ledger, inputs: Container[Path]) -> None:
     """Raise InvalidParameterError where a batch would replace what is not its own, or write elsewhere."""
     out = ledger.path.parent
-    outputs = [RECIPE_FILE, ledger.table.name, *(each for task in tasks for each in task.outputs)]
+    outputs = [RECIPE_FILE, *(each for task in tasks for each in task.outputs)]
     refuse_ways_out(out, outputs)
     for each in outputs:
         if out / each in inputs:

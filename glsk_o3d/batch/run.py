@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import logging
 import os
 import shutil
-import signal
-import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,18 +16,16 @@ from ..errors import BatchError, InvalidParameterError
 from ..interop.atomic import write_json
 from ..numerics.cores import cores
 from ..parameters import check_number
-from .ledger import DONE, FAILED, LEDGER_COLUMNS, LOCK_FILE, STARTED, Row, locked, refuse_ways_out
+from .ledger import DONE, FAILED, LOCK_FILE, STARTED, Row, locked, refuse_ways_out
 from .plan import RECIPE_FILE, TILES_FOLDER, UP_TO_DATE, Plan, plan_batch
 from .tasks import Task, failure, in_one_line, work
-from .workers import DaskWorkers, GivenWorkers, LocalWorkers, Workers, died
+from .workers import CONNECTION_LOST, DaskWorkers, LocalWorkers, Workers, died
 
 if TYPE_CHECKING:
     import distributed
 
-_POLL_SECONDS = 0.2  # seconds until Ctrl-C is noticed
-CANCELLED = "the work was cancelled, or its scheduler has gone: run the same batch to go on"
+_POLL_SECONDS = 0.2  # seconds until Ctrl-C is noticed on Windows, and workers that have come or gone
 WORKER_DIED = "the worker died with it, also alone: out of memory, or a crash in native code"
-_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -72,7 +66,6 @@ def run_batch(
     *,
     workers: int | None = None,
     scheduler: str | os.PathLike | distributed.Client | None = None,
-    executor: Executor | None = None,
     on_plan: Callable[[Plan], object] | None = None,
     on_result: Callable[[Row], object] | None = None,
     **options: Any,
@@ -80,9 +73,8 @@ def run_batch(
     """Skeletonise many clouds, several at a time.
 
     A failed file does not stop the others. Finished clouds are in the ledger, ``ledger.jsonl`` in `out_dir`. The same
-    call again skips them and retries failures. The first Ctrl-C starts no more work and waits for running work; the
-    second does not wait. The next call continues in both cases. A cloud whose worker dies, for example for lack of
-    memory, is tried again at the end, alone.
+    call again skips them and retries failures, also after Ctrl-C, which stops at once. A cloud whose worker dies, for
+    example for lack of memory, is tried again at the end, alone.
 
     Parameters
     ----------
@@ -93,8 +85,6 @@ def run_batch(
     scheduler : str, path-like or distributed.Client, optional
         A Dask cluster instead: the address of its scheduler, or its scheduler file. Its workers read and write the same
         files, by the same paths.
-    executor : concurrent.futures.Executor, optional
-        Another executor instead; `workers` is the number of clouds that it gets at a time.
     on_plan : callable, optional
         Called with the `Plan` before the work begins.
     on_result : callable, optional
@@ -120,8 +110,8 @@ def run_batch(
     >>> [row["input"] for row in result.rows.values() if row["status"] == "failed"]  # doctest: +SKIP
     []
     """
-    if scheduler is not None and (executor is not None or workers is not None):
-        raise InvalidParameterError("scheduler: the cluster has its own workers: give neither workers nor an executor")
+    if scheduler is not None and workers is not None:
+        raise InvalidParameterError("scheduler: the cluster has its own workers: give no number of them")
     check_number("workers", workers, "int?", low=1)
     folder = Path(os.path.abspath(out_dir))
     new = [each for each in (folder, *folder.parents) if not each.exists()]
@@ -136,13 +126,17 @@ def run_batch(
             raise
         if on_plan is not None:
             on_plan(plan)
-        crew, complete = _hired(plan, workers, scheduler, executor), False
-        start = time.perf_counter()
+        crew: Workers
+        if scheduler is not None and plan.todo:
+            crew = DaskWorkers(scheduler)
+        else:
+            crew = LocalWorkers(min(workers or cores(), len(plan.todo)))
+        start, complete = time.perf_counter(), False
         try:
             try:
                 _Run(plan, crew, on_result).work_through()
             finally:
-                plan.ledger.close()
+                plan.ledger.rewrite()
             complete = True
         finally:
             crew.close(at_once=not complete)
@@ -152,38 +146,15 @@ def run_batch(
     return BatchResult(rows, done, plan.skipped, failed, time.perf_counter() - start, plan.ledger.path)
 
 
-def _hired(plan: Plan, workers, scheduler, executor) -> Workers:
-    if scheduler is not None and plan.todo:
-        return DaskWorkers(scheduler)
-    if executor is not None:
-        return GivenWorkers(executor, workers)
-    return LocalWorkers(min(workers or cores(), len(plan.todo)))
-
-
-@contextmanager
-def _counted_interrupts() -> Iterator[list[int]]:
-    """Count Ctrl-C in a list instead of being torn out of the block by it; outside the main thread none comes."""
-    pressed: list[int] = []
-    if threading.current_thread() is not threading.main_thread():
-        yield pressed
-        return
-    before = signal.signal(signal.SIGINT, lambda number, frame: pressed.append(number))
-    try:
-        yield pressed
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
 class _Run:
     """A batch at work. Scenes are joined when all tiles are done."""
 
     def __init__(self, plan: Plan, workers: Workers, on_result: Callable[[Row], object] | None):
         self._plan, self._workers, self._on_result = plan, workers, on_result
         self._rows = plan.ledger.rows
-        self._interrupts: list[int] = []
 
     def work_through(self) -> None:
-        """Hand out all tasks. Ctrl-C hands out no more and waits for what is in work; the second one does not wait."""
+        """Hand out all tasks, those that need others last."""
         plan = self._plan
         for task in plan.tasks:
             if task.why == UP_TO_DATE:
@@ -192,33 +163,25 @@ class _Run:
         write_json(plan.out_dir / RECIPE_FILE, plan.recipe)
         for folder in {(plan.out_dir / task.name).parent for task in plan.todo}:
             folder.mkdir(parents=True, exist_ok=True)  # a worker's own would be where nobody looks
-        with _counted_interrupts() as self._interrupts:  # no line of the ledger is torn
-            self._do([task for task in plan.todo if not task.needs])
-            self._do([task for task in plan.todo if task.needs and self._has_all_tiles(task)])
+        self._do([task for task in plan.todo if not task.needs])
+        self._do([task for task in plan.todo if task.needs and self._has_all_tiles(task)])
 
     def _do(self, tasks: list[Task]) -> None:
         """Have tasks done, and those whose workers died once more, each by itself."""
         for task in self._round(tasks):
             for lost in self._round([task]):
                 self._enter(lost, failure(WORKER_DIED))
-        if self._interrupts:
-            raise KeyboardInterrupt
 
     def _round(self, tasks: list[Task]) -> list[Task]:
         """Have tasks done, side by side; gives those whose workers died."""
-        ready, running, lost, said = deque(tasks), {}, [], False
-        while running or (ready and not self._interrupts):
-            while len(running) < self._workers.capacity() and ready and not self._interrupts:
+        ready, running, lost = deque(tasks), {}, []
+        while running or ready:
+            while len(running) < self._workers.capacity() and ready:
                 task = ready.popleft()
                 self._begin(task)
                 running[self._workers.submit(work, task)] = task
             ended, _ = wait(running, _POLL_SECONDS, FIRST_COMPLETED)
             lost += self._collect({future: running.pop(future) for future in ended})
-            if len(self._interrupts) > 1:
-                break
-            if self._interrupts and not said:
-                said = True
-                _log.warning("finishing %d running clouds, starting no more: Ctrl-C again stops at once", len(running))
         return lost
 
     def _begin(self, task: Task) -> None:
@@ -227,16 +190,18 @@ class _Run:
             return
         tiles = f"{task.name}{TILES_FOLDER}"  # those of another size, or of another cut of the scene
         old = [name for name in self._rows if task.needs and name.startswith(tiles) and name not in task.needs]
-        rows = [self._rows.pop(name) for name in (task.name, *old) if name in self._rows]
+        rows = [self._rows[name] for name in (task.name, *old) if name in self._rows]
         for output in {*task.outputs, *(output for row in rows for output in row["outputs"])}:
             Path(task.out_dir, output).unlink(missing_ok=True)
+        for row in rows:
+            del self._rows[row["name"]]
         self._add(task, {"status": STARTED, "outputs": list(task.outputs)})
 
     def _collect(self, ended: dict[Future, Task]) -> list[Task]:
         """Put what came of tasks into the ledger; BatchError, in the end, where there is nobody to work any more."""
         gone, lost = None, []
         for future, task in ended.items():
-            error = BatchError(CANCELLED) if future.cancelled() else future.exception()
+            error = BatchError(CONNECTION_LOST) if future.cancelled() else future.exception()
             if isinstance(error, BatchError):
                 gone = error
             elif died(error):
@@ -260,8 +225,7 @@ class _Run:
             self._on_result(row)
 
     def _add(self, task: Task, row: Row) -> Row:
-        row = {"parameters": self._plan.parameters} | row | {"name": task.name, "input": task.source}
-        row = {name: row[name] for name in LEDGER_COLUMNS if name in row}
+        row = {"parameters": self._plan.parameters, **row, "name": task.name, "input": task.source}
         self._plan.ledger.add(row)
         return row
 

@@ -1,9 +1,9 @@
-"""A scene is taken apart into files of its own, a block at a time: a file per label, or per tile."""
+"""A scene is taken apart into files of its own, a block at a time: a file per tile."""
 
 import json
 import shutil
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InvalidCloudError, InvalidParameterError, did_you_mean
+from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.atomic import write_json
 from ..io.formats import ply
 from ..io.scan import COLOR_CHANNELS, Scan
@@ -20,26 +20,18 @@ from ..numerics.frame import not_finite
 from .grid import Grid, tile_name, tile_of
 
 PARTS_FOLDER, PARTS_FILE = ".parts", "parts.json"
-MOST_PARTS = 10_000  # fitted: more things than anybody numbers in a file; fewer than a scanner's intensities
+MOST_TILES = 10_000  # fitted: more than anybody waits for; each is a file
 _COUNT_WIDTH = 20  # derived: digits of the largest 64-bit number: the header is written before the count is known
 
 
 @dataclass(frozen=True)
 class Cut:
-    """How scenes are taken apart: into a part for each value of an attribute, or for each tile of a size."""
+    """How scenes are taken apart."""
 
-    by: str | None = None
-    tiles: float | None = None
-    overlap: float | None = None
+    tiles: float  # size at most
+    overlap: float
     where: str | None = None  # only points for which this holds
     drop_invalid: bool = False  # pass over points that are not finite, which belong to no tile, instead of refusing
-
-    def __str__(self) -> str:
-        return f"by = {self.by!r}" if self.tiles is None else f"tiles = {self.tiles:g}"
-
-    def words(self, label: str) -> str:
-        """Which points a part has."""
-        return f"where {self.by} == {label}" if self.tiles is None else f"tile {label}"
 
 
 @dataclass(frozen=True)
@@ -47,17 +39,17 @@ class Split:
     """A scene, taken apart."""
 
     of: list[Any]  # which file, and how
-    labels: tuple[str, ...]  # of the parts: a value of the attribute, or the name of a tile
+    labels: tuple[str, ...]  # names of the tiles
     points: int
-    dropped: int  # points that are in no part: without a label, or a place
-    grid: Grid | None = None  # of the tiles
+    dropped: int  # points that are in no tile, since they have no place
+    grid: Grid
 
 
 def read_split(path: Path) -> Split:
     """What is known of the parts of a scene, from its file."""
     kept = json.loads(path.read_text(encoding="utf-8"))
-    grid: Any = kept["grid"] and {name: tuple(v) if isinstance(v, list) else v for name, v in kept["grid"].items()}
-    return Split(kept["of"], tuple(kept["labels"]), kept["points"], kept["dropped"], grid and Grid(**grid))
+    grid: Any = {name: tuple(v) if isinstance(v, list) else v for name, v in kept["grid"].items()}
+    return Split(kept["of"], tuple(kept["labels"]), kept["points"], kept["dropped"], Grid(**grid))
 
 
 def known_split(folder: Path, of: list[Any]) -> Split | None:
@@ -69,9 +61,9 @@ def known_split(folder: Path, of: list[Any]) -> Split | None:
 
 
 def divide(path: Path, folder: Path, cut: Cut, of: list[Any]) -> Split:
-    """Take a scene apart: a file for each part, and one for what is known of them.
+    """Take a scene apart: a file for each tile, and one for what is known of them.
 
-    InvalidParameterError where the scene lacks what is asked for.
+    InvalidParameterError where there would be too many.
     """
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
@@ -121,27 +113,23 @@ class PartFiles:
 
 def _divided(path: Path, cut: Cut, of: list[Any], files: PartFiles) -> Split:
     """Hand out the points of a scene to the files of its parts, a block at a time."""
-    grid = None if cut.tiles is None else _grid(path, cut)
+    grid = _grid(path, cut)
     labels: set[str] = set()
     points = kept = 0
     for scan in read_blocks(path, where=cut.where):
         points += len(scan)
-        scan = scan[_finite(scan) if grid is not None else np.isfinite(_values(scan, cut.by))]
+        scan = scan[_finite(scan)]
         kept += len(scan)
-        rows = dict(_parted(scan, cut.by, grid))
+        rows = {tile_name(tile): chosen for tile, chosen in grid.parted(scan.positions)}
         labels.update(rows)
-        if len(labels) > MOST_PARTS:
-            why = "it numbers no things" if grid is None else "give larger tiles"
-            raise InvalidParameterError(f"has {len(labels)} parts or more: {why}")
+        if len(labels) > MOST_TILES:
+            raise InvalidParameterError(f"has {len(labels)} tiles or more: give larger ones")
         files.add(scan, rows)
-    ordered = sorted(labels, key=float if grid is None else tile_of)
-    return Split(of, tuple(ordered), points, points - kept, grid)
+    return Split(of, tuple(sorted(labels, key=tile_of)), points, points - kept, grid)
 
 
 def _grid(path: Path, cut: Cut) -> Grid:
     """The grid over the box of the points."""
-    assert cut.tiles is not None
-    assert cut.overlap is not None
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     points = invalid = first = 0
     for scan in read_blocks(path, where=cut.where):
@@ -160,21 +148,3 @@ def _grid(path: Path, cut: Cut) -> Grid:
 
 def _finite(scan: Scan) -> np.ndarray:
     return np.isfinite(scan.positions).all(axis=1)
-
-
-def _values(scan: Scan, by: Any) -> np.ndarray:
-    """The attribute of the points that is their label; without one it is NaN, say."""
-    if by not in scan.attributes:
-        raise InvalidParameterError(did_you_mean(str(by), scan.given, "attribute of its points"))
-    return scan.attributes[by]
-
-
-def _parted(scan: Scan, by: Any, grid: Grid | None) -> Iterator[tuple[str, np.ndarray]]:
-    """The parts of the points of a block: label, and which of them."""
-    if grid is not None:
-        yield from ((tile_name(tile), rows) for tile, rows in grid.parted(scan.positions))
-        return
-    values, group = np.unique(_values(scan, by), return_inverse=True)
-    order = np.argsort(group, kind="stable")
-    for value, rows in zip(values.tolist(), np.split(order, np.cumsum(np.bincount(group))[:-1]), strict=False):
-        yield repr(value).removesuffix(".0"), rows  # all digits: others may differ in the last one

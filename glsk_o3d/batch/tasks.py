@@ -72,7 +72,6 @@ def failure(error: str) -> Row:
 
 
 def _skeletonize(task: Task, row: Row, messages: list[str]) -> None:
-    row |= {"seams": None, "unmatched": None}
     if task.needs:
         skeleton = _joined(task, row)
     elif task.is_tile:
@@ -107,7 +106,6 @@ def _of_tile(task: Task) -> Skeleton:
 def _joined(task: Task, row: Row) -> Skeleton:
     """The skeleton of a scene, from those of its tiles; the row gets how they met."""
     split, files = read_split(Path(task.path)), [Path(task.out_dir, f"{name}{TILE_ENDING}") for name in task.needs]
-    assert split.grid is not None
     skeletons = {tile_of(file.stem): read_skeleton(file) for file in files}
     skeleton, seams = join_tiles(skeletons, split.grid)
     row |= {"seams": seams.joined, "unmatched": seams.unmatched}

@@ -1,4 +1,4 @@
-"""Where the work is done: processes of this machine, a Dask cluster, or any executor."""
+"""Where the work is done: processes of this machine, or a Dask cluster."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from ..errors import BatchError, PluginWarning, SkeletonWarning
 from ..interop.packages import require
-from ..numerics.cores import cores
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 _SCHEDULER_SECONDS = 10  # seconds until a scheduler must answer
+CONNECTION_LOST = "the connection to the Dask scheduler is lost: run the same batch to go on"
 
 
 def died(error: BaseException | None) -> bool:
@@ -99,27 +99,7 @@ def _follow() -> None:
         os._exit(1)
 
 
-class GivenWorkers:
-    """An executor that somebody else made and will shut down."""
-
-    def __init__(self, executor: Executor, count: int | None = None):
-        self._executor, self._gone = executor, "the executor takes no more work"
-        self._count = count or cores()
-
-    def capacity(self) -> int:
-        return self._count
-
-    def submit(self, function: Callable, *arguments: Any) -> Future:
-        try:
-            return self._executor.submit(function, *arguments)
-        except Exception as error:  # shut down, broken, or whatever a lost connection raises
-            raise BatchError(f"{self._gone}: {error}") from error
-
-    def close(self, *, at_once: bool) -> None:
-        pass
-
-
-class DaskWorkers(GivenWorkers):
+class DaskWorkers:
     """A Dask cluster: the address of its scheduler, the file that this wrote, or a ``distributed.Client``.
 
     BatchError where no scheduler answers.
@@ -138,9 +118,8 @@ class DaskWorkers(GivenWorkers):
                 scheduler = distributed.Client(**where, timeout=_SCHEDULER_SECONDS, set_as_default=False)
             except Exception as error:  # no answer, no address, no such protocol
                 raise BatchError(f"{text}: no Dask scheduler answers there: {error}") from error
-        self._client, self._asked = scheduler, -1.0
-        super().__init__(scheduler.get_executor(pure=False), 1)
-        self._gone = "the connection to the Dask scheduler is lost: run the same batch to go on"
+        self._client, self._executor = scheduler, scheduler.get_executor(pure=False)
+        self._count, self._asked = 1, -1.0
 
     def capacity(self) -> int:
         """Twice the threads of the cluster as it is now, so that none of them waits for us; one, while it has none."""
@@ -148,14 +127,22 @@ class DaskWorkers(GivenWorkers):
             try:
                 self._count = max(1, 2 * sum(self._client.nthreads().values()))
             except Exception as error:  # whatever a lost connection raises
-                raise BatchError(self._gone) from error
+                raise BatchError(CONNECTION_LOST) from error
             self._asked = time.monotonic()
         return self._count
 
+    def submit(self, function: Callable, *arguments: Any) -> Future:
+        """Hand out one piece of work; BatchError where the scheduler is gone."""
+        try:
+            return self._executor.submit(function, *arguments)
+        except Exception as error:  # whatever a lost connection raises
+            raise BatchError(CONNECTION_LOST) from error
+
     def close(self, *, at_once: bool) -> None:
+        """Let the workers go; at once: without waiting for what they do."""
         self._executor.shutdown(wait=not at_once)
         if self._own:
             self._client.close(timeout=5)
 
 
-Workers = LocalWorkers | GivenWorkers
+Workers = LocalWorkers | DaskWorkers

@@ -35,7 +35,6 @@ def batch(
         str | None, option("ADDRESS|FILE", "Work on a Dask cluster: tcp://host:port, or the file of its scheduler.")
     ] = None,
     where: options.Where = None,
-    by: Annotated[str | None, option("ATTRIBUTE", "One skeleton for each value of it, such as treeID.")] = None,
     tiles: Annotated[
         float | None, option("SIZE", "Skeletonise scenes in tiles of at most this size, and join them.")
     ] = None,
@@ -47,9 +46,8 @@ def batch(
 ) -> None:
     """Skeletonise many scans, several at a time.
 
-    A scan that fails does not stop the others. FOLDER/ledger.jsonl (and ledger.csv) has a line for each; the same
-    command again skips what is done and tries again what failed. Ctrl-C finishes the scans in work and stops; a second
-    Ctrl-C stops at once. Both leave the ledger in order. The exit code is 1 if a scan failed.
+    A scan that fails does not stop the others. FOLDER/ledger.jsonl has a line for each; the same command again skips
+    what is done, and tries again what failed or was in work at Ctrl-C. The exit code is 1 if a scan failed.
     """
     from ..batch import plan_batch, run_batch
     from .overrides import choose
@@ -61,7 +59,6 @@ def batch(
         cut_loops=cut_loops,
         recursive=recursive,
         where=where,
-        by=by,
         tiles=tiles,
         overlap=overlap,
         force=force,
@@ -106,8 +103,7 @@ def _tell_result(result: BatchResult, left_out: dict[str, str]) -> None:
     facts |= {"ledger": str(result.ledger)}
     tell({**facts, "failures": failed, "left_out": left_out}, lambda: print_rows(facts))
     if failed:
-        table = result.ledger.with_suffix(".csv")
-        raise BatchError(f"{len(failed)} of {len(rows)} scans failed: {table} says why")
+        raise BatchError(f"{len(failed)} of {len(rows)} scans failed: {result.ledger} says why")
 
 
 def _tell_plan(plan: Plan) -> None:

@@ -17,7 +17,6 @@ from .options import SKELETON_ENDINGS
 from .reporting import WrongUsage
 
 if TYPE_CHECKING:
-    from ..viewing.page import ContractionRecorder
 
 
 class Output(NamedTuple):
@@ -36,9 +35,8 @@ def skeleton_outputs(
     *,
     title: str = "",
     cut_loops: bool = False,
-    recorder: ContractionRecorder | None = None,
 ) -> list[Output]:
-    """The files of a skeleton, its picture and its page; the recorder watches the run, for the page."""
+    """The files of a skeleton, its picture and its page."""
     from .. import save_preview, save_report, save_skeleton
 
     endings = tuple(f".{ending}" for ending in SKELETON_ENDINGS)
@@ -46,7 +44,7 @@ def skeleton_outputs(
     return [
         *(Output(path, endings, "file is a skeleton", save) for path in skeletons or []),
         Output(preview, (".png",), "picture is a PNG", partial(save_preview, title=title)),
-        Output(page, (".html", ".htm"), "report is a page", partial(save_report, recorder=recorder, title=title)),
+        Output(page, (".html", ".htm"), "report is a page", partial(save_report, title=title)),
     ]
 
 

@@ -23,25 +23,23 @@ def run(
         output_option("FILE", "The last layer: a skeleton, points or a mesh (ply, xyz)."),
     ] = None,
     listed: Annotated[bool, Option("--list", help="List the scripts that come with the package.")] = False,
-    any_filter: Annotated[
-        bool, Option("--any-meshlab-filter", help="Trust the script: filters may write, read and send files.")
-    ] = False,
     cut_loops: CutLoops = False,
 ) -> None:
     """Run a MeshLab filter script, with MeshLab's filters and ours.
 
-    The whole script is checked before anything is run. Filters of MeshLab's own need pymeshlab; --list marks the
-    scripts that have some.
+    The whole script is checked before anything is run. It needs pymeshlab.
     """
-    from ..meshlab.layers import Layer, check_ending
-    from ..meshlab.steps import PlainLayers, find_script, read_steps
+    from ..meshlab.layers import check_ending
+    from ..meshlab.steps import find_script, read_steps
 
     if listed:
         _list()
         return
     if script is None or scan is None:
         raise WrongUsage("a SCRIPT and a SCAN are needed: glsk run SCRIPT SCAN -o FILE, or --list")
-    steps = read_steps(find_script(script), any_filter)
+    from ..meshlab.meshset import MeshSet
+
+    steps = read_steps(find_script(script))
     makes = steps[-1].verb.makes if steps[-1].verb else "skeleton, points or mesh"
     measures = steps[-1].name.startswith("get_")  # a script that ends in a measurement needs no file
     try:
@@ -49,17 +47,16 @@ def run(
             check_ending(path, makes)
     except FileFormatError as error:
         raise WrongUsage(str(error)) from None
-    outputs = [Output(path, ("",), makes, lambda it, path: it.save(path, cut_loops=cut_loops)) for path in output or []]
+
+    def save(layers: Any, path: Path) -> None:
+        layers.layer().save(path, cut_loops=cut_loops)
+
+    outputs = [Output(path, ("",), makes, save) for path in output or []]
     check_outputs(outputs, scan, needed=None if measures else "an output with -o")
     with progress() as update:
         update(f"reading {scan.name}")
-        if any(step.verb is None for step in steps):
-            from ..meshlab.meshset import MeshSet
-
-            layers: Any = MeshSet()
-            layers.load_scan(scan)
-        else:
-            layers = PlainLayers(Layer.read(scan))
+        layers: Any = MeshSet()
+        layers.load_scan(scan)
         results = []
         for i, step in enumerate(steps, 1):
             doing = f"{i} of {len(steps)}: {step.call.name}"
@@ -90,12 +87,8 @@ def _plain(result: Any) -> Any:
 
 
 def _list() -> None:
-    from ..meshlab.script import comment, read_script, scripts
-    from ..meshlab.steps import meshlabs_own
+    from ..meshlab.script import comment, scripts
 
-    found: list[dict[str, Any]] = [
-        {"name": name, "needs_pymeshlab": bool(meshlabs_own(read_script(path), path)), "doc": comment(path)}
-        for name, path in scripts().items()
-    ]
-    rows = [(each["name"] + "\n  needs pymeshlab" * each["needs_pymeshlab"], each["doc"]) for each in found]
-    tell(found, lambda: print_table(rows, wrap=True))
+    found = {name: comment(path) for name, path in scripts().items()}
+    told = [{"name": name, "doc": doc} for name, doc in found.items()]
+    tell(told, lambda: print_table(list(found.items()), wrap=True))

@@ -40,7 +40,7 @@ def skeletonize(
     Everything that can be checked is checked before the computation starts. Files appear complete or not at all. Of
     files with more than ten million points only a sample is read.
     """
-    from .. import ContractionRecorder, annotate_file, read_cloud, save_mesh, to_tubes
+    from .. import annotate_file, read_cloud, save_mesh, to_tubes
     from ..interop.packages import require
     from ..io.meshes import WRITTEN_MESH_ENDINGS
     from ..io.scans import WRITTEN_CLOUD_ENDING
@@ -49,13 +49,12 @@ def skeletonize(
     from .overrides import choose
 
     chosen = choose(pipeline, settings, drop_invalid)
-    recorder = ContractionRecorder() if report is not None else None
 
     def label(skeleton: Skeleton, path: Path) -> None:
         annotate_file(skeleton, scan, path, where=where)
 
     results = [
-        *skeleton_outputs(output, preview, report, title=scan.name, cut_loops=cut_loops, recorder=recorder),
+        *skeleton_outputs(output, preview, report, title=scan.name, cut_loops=cut_loops),
         Output(tubes, WRITTEN_MESH_ENDINGS, "tubes are a mesh", lambda it, path: save_mesh(to_tubes(it), path)),
         Output(labelled, (WRITTEN_CLOUD_ENDING,), "cloud with labels is PLY", label),
     ]
@@ -67,7 +66,7 @@ def skeletonize(
         cloud = sample_for(chosen, scan, where)
         if cloud is None:
             cloud = read_cloud(scan, where=where)
-        skeleton, seconds = _run(chosen, cloud, update, recorder)
+        skeleton, seconds = _run(chosen, cloud, update)
         if support is not None:
             comparing = "comparing with the skeleton of sample {} of {}"
             skeleton = with_support(skeleton, chosen, support, on_draw=lambda *n: update(comparing.format(*n), *n))
@@ -99,16 +98,14 @@ def demo(
     skeletonize(folder / "cloud.ply", outputs, preview=folder / "skeleton.png")
 
 
-def _run(pipeline: Callable[..., Skeleton], cloud: Any, update, on_state=None) -> tuple[Skeleton, float]:
+def _run(pipeline: Callable[..., Skeleton], cloud: Any, update) -> tuple[Skeleton, float]:
     """Run a pipeline and show how far it is; gives the skeleton, and the seconds it took."""
 
     def on_iteration(record):
         update(f"solve {record.iteration}: {record.n_points - record.n_merged} points are left")
 
     start = time.perf_counter()
-    skeleton = pipeline(
-        cloud, on_iteration=on_iteration, on_state=on_state, on_stage=lambda stage: update(type(stage).__name__)
-    )
+    skeleton = pipeline(cloud, on_iteration=on_iteration, on_stage=lambda stage: update(type(stage).__name__))
     return skeleton, time.perf_counter() - start
 
 

@@ -15,9 +15,6 @@ ON_LAYERS = ("apply_", "compute_", "create_", "delete_", "generate_", "get_", "m
 """Beginnings of the names of filters that work on layers; others save, load, export or build files."""
 
 
-LENGTHS = ("RichAbsPerc", "RichPercentage")
-
-
 @cache
 def names() -> dict[str, str]:
     """What MeshLab calls its filters in menus and scripts, and what pymeshlab does. (pymeshlab cannot be asked.)
@@ -58,7 +55,7 @@ class Builtin:
     def read(self, param: Param) -> Any:
         """The value of a parameter in a script as pymeshlab takes it, who is asked; ValueError if it is wrong."""
         try:
-            value = self._value(param.text, param.type in LENGTHS)
+            value = self._value(param.text, param.type in ("RichAbsPerc", "RichPercentage"))
             trial().filter_parameter_values(self.filter, **{self.name: value})
         except Exception as error:  # pymeshlab's exceptions have no base of their own
             raise ValueError(f"{param.text!r}: " + str(error).partition("\n")[0]) from None
@@ -78,15 +75,14 @@ class Builtin:
         return kind(*map(int, text.split(","))) if kind is pymeshlab.Color else kind(text)
 
 
-def slots(filter: str, any_filter: bool = False) -> dict[str, Builtin]:
+def slots(filter: str) -> dict[str, Builtin]:
     """The parameters of a filter by pymeshlab's name, as `pythonic` has their names.
 
-    Filters that do not work on layers are refused without `any_filter`, by a ValueError.
+    Filters that do not work on layers are refused by a ValueError.
     """
-    if not (any_filter or filter.startswith(ON_LAYERS)):
+    if not filter.startswith(ON_LAYERS):
         raise ValueError(
-            "it writes or reads files, or sends them: scripts run only filters that work on layers, unless "
-            "any_filter=True says that this one is trusted"
+            "it writes or reads files, or sends them: scripts run only filters that work on layers; call it in Python"
         )
     if filter not in require("pymeshlab").filter_list():
         raise ValueError("the pymeshlab that is installed has no such filter")

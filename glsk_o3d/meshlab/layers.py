@@ -16,10 +16,9 @@ from ..interop.clouds import cloud_points
 from ..interop.packages import require
 from ..io.formats import ply
 from ..io.formats.graphs import graph_skeleton
-from ..io.paths import existing_file
 from ..io.scan import COLOR_CHANNELS
 from ..io.scans import read_scan
-from ..io.skeletons import holds_skeleton, read_skeleton, save_skeleton, skeleton_ending
+from ..io.skeletons import save_skeleton, skeleton_ending
 from ..skeleton import Skeleton
 
 LAYER_ENDINGS = {"points": (".ply", ".xyz"), "mesh": (".ply",)}
@@ -31,8 +30,7 @@ class Layer:
     """Vertices with what hangs on them, (N, ...) arrays: MeshLab calls the scalars quality.
 
     Scalars are the radii of a skeleton, or the branches of a segmented cloud. Colours are red, green, blue and alpha
-    from 0 to 1. `skeleton` is what the vertices and edges show, `source` the layer that it was made from, and `cut` the
-    places where loops were cut.
+    from 0 to 1. `skeleton` is what the vertices and edges show, and `source` the layer that it was made from.
     """
 
     vertices: np.ndarray
@@ -44,7 +42,6 @@ class Layer:
     label: str = "cloud"
     skeleton: Skeleton | None = None
     source: Layer | None = None
-    cut: list[list[float]] | None = None
 
     @classmethod
     def of(cls, data: Any, label: str = "cloud", source: Layer | None = None) -> Layer:
@@ -56,30 +53,16 @@ class Layer:
 
     @classmethod
     def read(cls, path: str | os.PathLike) -> Layer:
-        """A scan that `read_cloud` reads, with the faces of a mesh and the quality of points; or a skeleton's edges.
-
-        What STL repeats for every triangle becomes one vertex.
-        """
-        path = existing_file(path)
-        if holds_skeleton(path):
-            drawing = read_skeleton(path)
-            edges = drawing.edges if len(drawing.edges) else None
-            radii = None if np.isnan(drawing.radii).all() else drawing.radii
-            return cls(drawing.vertices, edges=edges, scalars=radii, label=path.name)
+        """A scan that `read_cloud` reads, with the faces of a mesh and the quality of points."""
         scan = read_scan(path)
-        points, normals, faces, colors = scan.positions, scan.normals, scan.triangles, scan.colors
-        if path.suffix.lower() == ".stl":
-            _, first, same = np.unique(points, axis=0, return_index=True, return_inverse=True)
-            kept = np.sort(first)
-            points, faces = points[kept], np.searchsorted(kept, first[same.ravel()])[faces]
-            normals = None if normals is None else normals[kept]
+        colors = scan.colors
         return cls(
-            points,
-            faces=faces if len(faces) else None,
-            normals=normals,
+            scan.positions,
+            faces=scan.triangles if len(scan.triangles) else None,
+            normals=scan.normals,
             scalars=scan.attributes["quality"].astype(float) if "quality" in scan.attributes else None,
             colors=None if colors is None else np.column_stack([colors, np.ones(len(colors))]),
-            label=path.name,
+            label=Path(path).name,
         )
 
     @classmethod
@@ -129,13 +112,10 @@ class Layer:
             found |= {"edges": len(skeleton.edges), "components": skeleton.n_components, "loops": skeleton.n_loops}
             found |= {"length": skeleton.length}
             report = skeleton.report
-            if report.stages:  # else it is from a file
-                found |= {"iterations": len(report.iterations), "converged": report.converged}
-                found |= {"stop_reason": report.stop_reason, "warnings": list(report.warnings)}
+            found |= {"iterations": len(report.iterations), "converged": report.converged}
+            found |= {"stop_reason": report.stop_reason, "warnings": list(report.warnings)}
         elif self.colors is not None and self.scalars is not None:
             found["branches"] = int(self.scalars.max(initial=-1)) + 1
-        if self.cut is not None:
-            found["cut"] = self.cut
         return found
 
     def to_pymeshlab(self) -> Any:

@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FileFormatError, GlskError, InvalidCloudError, InvalidParameterError, did_you_mean, in_words
+from ..errors import GlskError, InvalidCloudError, InvalidParameterError, did_you_mean
 from ..interop.packages import require
-from ..io.paths import SCAN_ENDINGS, existing_file
-from ..io.skeletons import FORMATS, holds_skeleton
+from ..io.skeletons import FORMATS
 from ..skeleton import Skeleton
 from . import builtin
 from .layers import Layer
@@ -31,7 +30,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
 
     A length is ``pymeshlab.PercentageValue`` or a string such as ``"2%"``, of the diagonal of the layer's bounding box
     as in MeshLab; or ``pymeshlab.PureValue`` or a float, in the units of the cloud. Defaults refer to the box of
-    ``Sampler.frame`` as elsewhere in this package: ``"1% of the frame"``.
+    ``Sampler.frame`` as elsewhere in this package.
 
     Without pymeshlab the import of the class raises MissingPackageError.
 
@@ -134,16 +133,9 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         else:
             print(verb.help)
 
-    def load_filter_script(self, filter_script_name: str | os.PathLike, *, any_filter: bool = False) -> None:
-        """Make a script file the current script. It is checked and not run; ScriptError names faults.
-
-        Parameters
-        ----------
-        filter_script_name : path-like
-        any_filter : bool
-            Allow filters of MeshLab that write, read or send files; only for trusted scripts.
-        """
-        self._script = read_steps(filter_script_name, any_filter)
+    def load_filter_script(self, filter_script_name: str | os.PathLike) -> None:
+        """Make a script file the current script. It is checked and not run; ScriptError names faults."""
+        self._script = read_steps(filter_script_name)
 
     def apply_filter_script(self) -> None:
         """Run the filters of the current script, in order, from the current layer on."""
@@ -198,20 +190,12 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         return layer.to_skeleton()
 
     def load_scan(self, path: str | os.PathLike) -> None:
-        """Add a scan from a file as a new layer, by `read_cloud` as in ``glsk run`` or else by MeshLab.
+        """Add a scan that `read_cloud` reads as a new layer, with the faces of a mesh and the quality of points.
 
-        FileNotFoundError or FileFormatError without points. `load_new_mesh` also has colours of faces and textures.
+        `load_new_mesh` reads MeshLab's formats, with textures and colours of faces.
         """
-        path = existing_file(path)
-        if path.suffix.lower() in SCAN_ENDINGS or holds_skeleton(path):
-            self.add_mesh(Layer.read(path).to_pymeshlab(), path.name)
-            return
-        try:
-            self.load_new_mesh(str(path))
-        except pymeshlab.PyMeshLabException as error:
-            raise FileFormatError(f"{path}: MeshLab cannot read it: {in_words(error)}") from error
-        if not self.current_mesh().vertex_number():
-            raise FileFormatError(f"{path}: no points could be read")
+        layer = Layer.read(path)
+        self.add_mesh(layer.to_pymeshlab(), layer.label)
 
     def save_current_mesh(self, file_name: str | os.PathLike, *args: Any, **kwargs: Any) -> None:
         """Write the current layer as pymeshlab; without options a layer of vertices and edges by `save_skeleton`.
@@ -220,21 +204,9 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         """
         lines = self.current_mesh().edge_number() and not self.current_mesh().face_number()
         if lines and not args and not kwargs and os.fspath(file_name).lower().endswith(tuple(FORMATS)):
-            self.save(file_name)
+            self.layer().save(file_name)
         else:
             super().save_current_mesh(os.fspath(file_name), *args, **kwargs)
-
-    def save(self, path: str | os.PathLike, **options: Any) -> None:
-        """Write the current layer as ``glsk run`` does, complete or not at all. Options are those of `save_skeleton`.
-
-        FileFormatError for an unknown ending.
-        """
-        self.layer().save(path, **options)
-
-    def clear(self) -> None:
-        """Remove all layers. The current script stays."""
-        super().clear()
-        self._made = {}
 
 
 def _known(name: Any) -> str:

@@ -1,1 +1,1 @@
-"""Things to look at: a page for the browser, a window, a picture in a notebook."""
+"""Things to look at: pictures, a page for the browser, a window."""

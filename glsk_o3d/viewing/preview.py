@@ -62,15 +62,15 @@ def save_preview(skeleton: Skeleton, path: str | os.PathLike, *, title: str | No
     figures.save_figure(draw(skeleton, title), path)
 
 
-def draw(skeleton: Skeleton, title: str | None = None, *, words: bool = True):
-    """The figure, not yet in a file; below it the counts and warnings, unless it is without words."""
+def draw(skeleton: Skeleton, title: str | None = None):
+    """The figure, not yet in a file."""
     cloud = skeleton.points[figures.thinned(skeleton.points, figures.MOST_DRAWN_POINTS)]
     centre, extent = figures.room(np.concatenate([cloud, skeleton.vertices]))
     head, foot, report = 0.58 if title else 0.25, 0.34, skeleton.report
-    room = _LINE_HEIGHT * (_MOST_LINES * _MOST_WARNINGS + 1) if words and report.warnings else 0
+    room = _LINE_HEIGHT * (_MOST_LINES * _MOST_WARNINGS + 1) if report.warnings else 0
     figure = figures.new_figure(figures.fitting_size(extent, head=head, foot=foot + room))
     width, height = figure.get_size_inches()
-    warned = _warned(report.warnings, width) if words else []
+    warned = _warned(report.warnings, width)
     below = _LINE_HEIGHT * len(warned)
     for a, b, axes in figures.three_views(figure, extent, head=head, foot=foot + below):
         scale = 72 * axes.get_position().width * width / extent[a]  # points per unit
@@ -80,9 +80,8 @@ def draw(skeleton: Skeleton, title: str | None = None, *, words: bool = True):
         if report.root:
             axes.scatter(*np.subtract(report.root, centre)[[a, b]], **ROOT_MARK, zorder=4, clip_on=False)
     style = dict(ha="center", parse_math=False)
-    if words:
-        told = (f"{name.replace('_', ' ')} {value}" for name, value in counts(skeleton).items())
-        figure.text(0.5, (0.12 + below) / height, "   ".join(told), color=INK, fontsize=8, **style)
+    told = (f"{name.replace('_', ' ')} {value}" for name, value in counts(skeleton).items())
+    figure.text(0.5, (0.12 + below) / height, "   ".join(told), color=INK, fontsize=8, **style)
     for row, line in enumerate(reversed(warned)):
         place = (0.1 + row * _LINE_HEIGHT) / height
         figure.text(0.5, place, figures.printable(line), color=_AMBER, fontsize=8, **style)

@@ -5,7 +5,6 @@ import os
 import subprocess
 import sys
 from collections import Counter
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -93,14 +92,13 @@ def write():
 
 
 @pytest.fixture
-def run(tmp_path):
-    """Run a batch from ``in``, or other inputs, to ``out`` in a thread; gives what was to be done, with the reasons."""
+def run(tmp_path, at_once):
+    """Run a batch from ``in``, or other inputs, to ``out``; gives what was to be done, with the reasons."""
 
     def call(inputs=None, out="out", **options):
         plans = []
-        with ThreadPoolExecutor(1) as pool:
-            inputs = tmp_path / "in" if inputs is None else inputs
-            call.result = run_batch(inputs, tmp_path / out, executor=pool, **{"on_plan": plans.append, **options})
+        inputs = tmp_path / "in" if inputs is None else inputs
+        call.result = run_batch(inputs, tmp_path / out, **{"on_plan": plans.append, **options})
         return {task.name: task.why for plan in plans for task in plan.todo}
 
     return call
@@ -126,7 +124,7 @@ def rows(tmp_path):
                     skeleton = read_skeleton(out / output)
                     assert (len(skeleton.vertices), skeleton.n_loops) == (line["vertices"], line["loops"])
         written = {output for line in lines for output in line["outputs"]}
-        own = {"ledger.jsonl", "ledger.csv", "recipe.json", ".ledger.lock"}
+        own = {"ledger.jsonl", "recipe.json", ".ledger.lock"}
         there = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()} - own
         there -= {name for name in there if name.startswith(".parts/")}
         assert written == there if strict else written <= there

@@ -56,6 +56,8 @@ def test_a_list(here):
     assert names("lists/list.txt") == ["b", (here / "in" / "a").relative_to(here.anchor).as_posix()]
     Path("scan.txt").write_text("1 2 3\n" * 9)
     assert names("scan.txt") == ["scan"]
+    Path("own.txt").write_text(".\n")  # it fails when its turn comes, and needs a name until then
+    assert names("own.txt") == [here.name]
 
 
 @pytest.mark.parametrize(
@@ -114,56 +116,3 @@ def test_what_is_not_there(given, message):
         names(given)
     with pytest.raises(InvalidParameterError, match="there is no input"):
         names()
-
-
-# ------------------------------------------------------------------------------------------------- files taken apart
-
-
-def table(name, header, *rows):
-    Path(name).parent.mkdir(exist_ok=True)
-    Path(name).write_text("\n".join([header, *rows]) + "\n")
-
-
-def apart(*inputs, **options):
-    """The inputs that are made of files, by name, and what is left out, by the names of the files."""
-    plan = plan_batch(inputs, "out", by="tree", split=True, **options)
-    left_out = {Path(path).name: reason for path, reason in plan.left_out.items()}
-    return {task.name: task.source for task in plan.tasks}, left_out
-
-
-def test_the_points_of_a_file_taken_apart_and_files_that_cannot_be(here):
-    table("forest.csv", "x,y,z,tree,cl", *(f"{i},0,0,{i % 3},5" for i in range(9)), "0,0,0,inf,5")
-    table("bare.xyz", "1 2 3")
-    table("broken.ply", "ply")
-    table("other.csv", "x,y,z,tree", "1,2,3,1")
-    found, left_out = apart("forest.csv", "bare.xyz", "broken.ply")
-    assert found == {
-        "broken": str(here / "broken.ply"),  # what is wrong with it shows when it is read
-        **{f"forest-{i}": f"{here / 'forest.csv'} where tree == {i}" for i in range(3)},
-    }
-    assert left_out == {"bare.xyz": "no attribute of its points is called 'tree': there are none"}
-    assert (
-        "no attribute of the points is called 'cl'" in apart("forest.csv", "other.csv", where="cl == 5")[1]["other.csv"]
-    )
-    with pytest.raises(InvalidParameterError, match=r"no input can be split.*bare\.xyz: no attribute"):
-        apart("bare.xyz")
-
-
-def test_a_label_never_takes_the_name_of_another_file():
-    table("in/a-1.ply", "ply")  # its points cannot be read, and it keeps its name
-    table("in/a.csv", "x,y,z,tree", "1,2,3,1")
-    with pytest.raises(InvalidParameterError, match="would both be called a-1"):
-        apart("in")
-
-
-def test_what_numbers_no_things_is_refused():
-    table("a.csv", "x,y,z,tree", *(f"1,2,3,{i}" for i in range(10_001)))
-    with pytest.raises(InvalidParameterError, match="has 10001 parts or more: it numbers no things"):
-        apart("a.csv")
-
-
-def test_a_list_that_names_its_own_folder(tmp_path, monkeypatch):
-    """It fails when its turn comes, and needs a name until then."""
-    monkeypatch.chdir(tmp_path)
-    Path("list.txt").write_text(".\n")
-    assert find_inputs(["list.txt"], "out")[0] == {tmp_path: tmp_path.name}

@@ -1,6 +1,5 @@
 """The ledger as a file, and its lock."""
 
-import csv
 import hashlib
 import json
 import os
@@ -10,7 +9,7 @@ import sys
 import pytest
 
 from glsk_o3d import BatchError
-from glsk_o3d.batch.ledger import LEDGER_COLUMNS, Ledger, file_hash, locked
+from glsk_o3d.batch.ledger import Ledger, file_hash, locked
 
 
 def row(name, **values):
@@ -26,7 +25,7 @@ def test_rows_are_in_the_file_at_once_and_the_last_of_a_name_counts(tmp_path):
     for each in (row("b", status="failed"), row("a"), row("b")):
         ledger.add(each)
         assert lines(tmp_path)[-1] == each
-    ledger.close()
+    ledger.rewrite()
     assert lines(tmp_path) == [row("a"), row("b")]
     assert Ledger(tmp_path).rows == ledger.rows
 
@@ -63,19 +62,6 @@ def test_a_broken_end_is_mended(tmp_path, end, caplog):
 def test_a_line_that_no_batch_wrote_is_passed_over(tmp_path, harm):
     (tmp_path / "ledger.jsonl").write_text(f"{json.dumps(row('a') | harm)}\n{json.dumps(row('b'))}\n")
     assert list(Ledger(tmp_path).rows) == ["b"]
-
-
-def test_the_table(tmp_path):
-    ledger = Ledger(tmp_path)
-    ledger.add(row('a, \n"b"', messages=["x", "y"], outputs=["a.ply", "a.png"], loops=2, unknown=1))
-    ledger.add(row(os.fsdecode(b"\xff"), status="failed", error="no"))
-    ledger.close()
-    with (tmp_path / "ledger.csv").open(encoding="utf-8", newline="") as stream:
-        table, odd = csv.DictReader(stream)
-    assert tuple(table) == LEDGER_COLUMNS
-    assert (table["name"], table["messages"], table["outputs"]) == ('a, \n"b"', "x; y", "a.ply; a.png")
-    assert (odd["status"], odd["error"], odd["loops"]) == ("failed", "no", "")
-    assert list(Ledger(tmp_path).rows)[-1] == os.fsdecode(b"\xff")
 
 
 def test_hash(tmp_path):

@@ -15,26 +15,24 @@ from glsk_o3d.batch.splitting import Cut, PartFiles, divide, known_split
 from glsk_o3d.io.scan import Scan
 from glsk_o3d.io.scans import read_blocks, read_scan
 
-TILES, LABELS = dict(tiles=2.0, overlap=0.25), dict(by="tree")
+TILES = dict(tiles=2.0, overlap=0.25)
 
 
 @pytest.fixture
 def table(tmp_path):
-    """Write points with labels, ``tree``, as a table; gives its path."""
+    """Write points as a table; gives its path."""
 
-    def write(points, labels, name="scene.csv"):
-        columns = np.column_stack([points, labels])
-        np.savetxt(tmp_path / name, columns, delimiter=",", header="x,y,z,tree", comments="", fmt="%.17g")
-        return tmp_path / name
+    def write(points):
+        np.savetxt(tmp_path / "scene.xyz", points, fmt="%.17g")
+        return tmp_path / "scene.xyz"
 
     return write
 
 
 @pytest.fixture
 def scene(table):
-    """Points with labels, far away."""
-    rng = np.random.default_rng(0)
-    return table(rng.random((900, 3)) * [5, 3, 1] + 1e6 / 3, rng.integers(0, 4, 900))
+    """Points far away."""
+    return table(np.random.default_rng(0).random((900, 3)) * [5, 3, 1] + 1e6 / 3)
 
 
 @pytest.fixture
@@ -62,35 +60,23 @@ def split(tmp_path):
     return call
 
 
-def test_a_file_per_label_in_one_pass(scene, passes, split, tmp_path):
-    found = split(scene, **LABELS, where="x > 333334")
-    assert found.labels == ("0", "1", "2", "3")
-    assert len(passes) == 1
-    scan = read_scan(scene, "x > 333334")
-    assert (found.points, found.dropped) == (len(scan), 0)
-    for label in found.labels:
-        of_label = scan.positions[scan.attributes["tree"] == float(label)]
-        np.testing.assert_array_equal(read_scan(tmp_path / "parts" / f"{label}.ply").positions, of_label)
-    assert split(scene, **LABELS, where="x > 333334") == found
-    assert len(passes) == 1  # known
-    assert set(split(scene, **LABELS, where="tree > 1").labels) == {"2", "3"}  # another cut
-    assert not (tmp_path / "parts" / "0.ply").exists()
-    scene.write_text(scene.read_text() + "1,2,3,9\n")
-    assert "9" in split(scene, **LABELS, where="tree > 1").labels  # another scene
-    assert len(passes) == 3
-
-
 def test_a_file_per_tile_in_two_passes(scene, passes, split, tmp_path):
-    found = split(scene, **TILES)
+    found = split(scene, **TILES, where="x > 333334")
     assert len(passes) == 2  # one for the box
-    assert found.grid.counts == (3, 2, 1)
-    positions = read_scan(scene).positions
+    positions = read_scan(scene, "x > 333334").positions
+    assert (found.grid.counts, found.points, found.dropped) == ((3, 2, 1), len(positions), 0)
     rows = dict(found.grid.parted(positions))
     assert {tile_of(label) for label in found.labels} == set(rows)
     for label in found.labels:
         part = read_scan(tmp_path / "parts" / f"{label}.ply").positions
         np.testing.assert_array_equal(part, positions[rows[tile_of(label)]])
-    assert split(scene, **TILES) == found
+    assert split(scene, **TILES, where="x > 333334") == found
+    assert len(passes) == 2  # known
+    assert len(split(scene, tiles=5.0, overlap=0.25).labels) == 1  # another cut
+    assert not (tmp_path / "parts" / "2-1-0.ply").exists()
+    scene.write_text(scene.read_text() + "333340 333333 333333\n")
+    assert len(split(scene, tiles=5.0, overlap=0.25).labels) == 2  # another scene
+    assert len(passes) == 6
 
 
 @pytest.mark.parametrize("harm", [b"[]", b"{}", b'{"of": 1}', b"\xff"])
@@ -114,7 +100,7 @@ def test_what_breaks_off_or_cannot_be_read_leaves_nothing(scene, split, tmp_path
 
     monkeypatch.setattr(splitting, "read_blocks", broken)
     with pytest.raises(OSError, match="the disk is gone"):
-        split(scene, **LABELS)
+        split(scene, **TILES)
     assert not (tmp_path / "parts").exists()
 
 
@@ -122,12 +108,12 @@ def test_a_splitting_that_is_killed_is_begun_anew(scene, split, tmp_path):
     code = (
         "import os, sys; from pathlib import Path; from glsk_o3d.batch import splitting as s\n"
         "s.PartFiles.close = lambda self: os._exit(9)\n"
-        "s.divide(Path(sys.argv[1]), Path(sys.argv[2]), s.Cut(by='tree'), [])"
+        "s.divide(Path(sys.argv[1]), Path(sys.argv[2]), s.Cut(2.0, 0.25), [])"
     )
     run = subprocess.run([sys.executable, "-c", code, str(scene), str(tmp_path / "parts")])
     assert run.returncode == 9
-    assert (tmp_path / "parts" / "0.ply").exists()
-    assert len(split(scene, **LABELS).labels) == 4
+    assert (tmp_path / "parts" / "0-0-0.ply").exists()
+    assert len(split(scene, **TILES).labels) == 6
 
 
 def test_normals_and_colours_stay(tmp_path):
@@ -147,17 +133,9 @@ def test_normals_and_colours_stay(tmp_path):
 def test_points_that_are_not_finite(table, passes, split):
     points = np.random.default_rng(0).random((300, 3)) * 4
     points[[100, 101, 250]] = np.inf
-    scene = table(points, np.zeros(300))
+    scene = table(points)
     with pytest.raises(InvalidCloudError, match=r"^3 of 300 points have NaN .* first at index 100: drop them"):
         split(scene, **TILES)
     assert len(passes) == 1
     found = split(scene, **TILES, drop_invalid=True)
     assert (found.points, found.dropped) == (300, 3)
-
-
-def test_labels(split, table):
-    corners = np.eye(3).repeat(4, axis=0)
-    found = split(table(corners, [1.5] * 6 + [np.nan] * 3 + [np.inf, np.inf, -np.inf]), **LABELS)
-    assert (found.labels, found.points, found.dropped) == (("1.5",), 12, 6)
-    found = split(table(corners, [1.0, 1e300, -2.2250738585072014e-308] * 4), **LABELS)
-    assert found.labels == ("-2.2250738585072014e-308", "1", "1e+300")

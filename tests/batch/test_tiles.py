@@ -74,16 +74,10 @@ def test_what_is_done_is_not_done_again(batch, tmp_path, rows):
     assert sorted(rows()) == ["scene", "scene.tiles/0-0-0", "scene.tiles/1-0-0"]  # the smaller tiles are gone
 
 
-@pytest.mark.parametrize("cut", [TILES, dict(by="tree")])
-def test_no_worker_reads_the_scene(tmp_path, run, cut):
-    rings = np.concatenate([samples.torus(300).points + [3 * i, 0, 0] for i in range(2)])
-    path, aside = tmp_path / "plot.csv", tmp_path / "aside"
-    np.savetxt(path, np.column_stack([rings, np.repeat([4, 7], 300)]), delimiter=",", header="x,y,z,tree", comments="")
-    run(path, on_plan=lambda plan: path.rename(aside), **cut)
-    whole = {name: row for name, row in run.result.rows.items() if ".tiles/" not in name}
-    assert whole.keys() == ({"plot-4", "plot-7"} if "by" in cut else {"plot"})
+def test_no_worker_reads_the_scene(scene, batch, run, tmp_path):
+    batch(on_plan=lambda plan: scene.rename(tmp_path / "aside"))
     assert {row["status"] for row in run.result.rows.values()} == {"done"}
-    assert sum(row["components"] for row in whole.values()) == 2
+    assert run.result.rows["scene"]["components"] == 2
 
 
 def test_a_tile_that_fails_leaves_the_scene_undone_and_is_tried_again(batch, run, rows, tmp_path, monkeypatch):
@@ -146,13 +140,12 @@ def test_the_plan_writes_nothing(scene, batch, tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (dict(tiles=-1), "tiles = -1: must be above 0"),
         (dict(tiles=1.0, overlap=0.5), "at most a quarter"),
         (dict(overlap=0.1), "needs tiles: give their size, too"),
-        (dict(tiles=1.0, by="tree"), "by and tiles cannot be combined: give one of them"),
         (dict(tiles=1.0, pipeline="tree"), "makes one tree of all in a tile"),
-        (dict(tiles=1e-7, overlap=1e-8), "the points span"),
-        (dict(by="tree"), "no attribute of its points is called 'tree'"),
+        (dict(tiles=1e-7, overlap=1e-8), r"scene\.ply: tiles = 1e-07: the points span"),
+        (dict(tiles=0.002, overlap=0.0005), r"scene\.ply: has \d+ tiles or more: give larger ones"),
+        (dict(tiles=1.0, where="tree == 1"), r"scene\.ply: no attribute of the points is called 'tree'"),
     ],
 )
 def test_what_is_refused_leaves_no_folder_behind(scene, tmp_path, options, message):

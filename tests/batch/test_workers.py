@@ -54,41 +54,19 @@ def test_a_script_without_a_guard_blames_no_scan(tmp_path, write):
     assert "failed" not in (tmp_path / "out" / "ledger.jsonl").read_text()
 
 
-@pytest.fixture
-def begin(saboteur, start, waiting, write, tmp_path):
-    """Start a batch of four scans and press Ctrl-C while the third waits; gives the process and its worker."""
+def test_ctrl_c_leaves_no_worker_and_on_again(saboteur, start, waiting, until, write, run, rows, tmp_path):
     for i in range(4):
         write(tmp_path / "in" / f"{i}.ply", seed=i, order=4000 * (i == 2))
-
-    def run():
-        batch = start("in", "-o", "out", "--pipeline", saboteur, "--workers", "1")
-        [worker] = map(psutil.Process, waiting(batch))
-        os.killpg(batch.pid, signal.SIGINT)
-        for line in batch.stderr:
-            if "finishing 1 running clouds, starting no more: Ctrl-C again stops at once" in line:
-                return batch, worker
-        pytest.fail("ended without a word of it")
-
-    return run
-
-
-def test_ctrl_c_and_on_again(begin, run, saboteur, rows, tmp_path):
-    batch, _ = begin()
-    (tmp_path / "saboteur" / "open").touch()
-    said = batch.stderr.read()
+    batch = start("in", "-o", "out", "--pipeline", saboteur, "--workers", "1")
+    [worker] = map(psutil.Process, waiting(batch))
+    os.killpg(batch.pid, signal.SIGINT)
+    said = batch.stderr.read()  # to its end, although the third scan never goes on
     assert batch.wait() == 130, said
     assert said.splitlines()[-1] == "glsk: error: interrupted; no file is half-written"
-    first = rows()
-    assert sorted(first) == ["0", "1", "2"]
-    assert list(run(pipeline=saboteur)) == ["3"]
+    until(lambda: not worker.is_running() or worker.status() == psutil.STATUS_ZOMBIE)  # nobody has asked after it
+    first = rows(strict=False)
+    assert sorted(first) == ["0", "1"]
+    (tmp_path / "saboteur" / "open").touch()
+    assert run(pipeline=saboteur) == {"2": "interrupted before", "3": "new"}
     again = rows()
     assert {name: again[name] for name in first} == first  # not done twice
-
-
-def test_ctrl_c_twice_leaves_no_worker(begin, until, rows):
-    batch, worker = begin()
-    os.killpg(batch.pid, signal.SIGINT)
-    said = batch.stderr.read()  # to its end, although the scan never goes on
-    assert batch.wait() == 130, said
-    until(lambda: not worker.is_running() or worker.status() == psutil.STATUS_ZOMBIE)  # nobody has asked after it
-    assert sorted(rows(strict=False)) == ["0", "1"]

@@ -3,7 +3,6 @@
 import io
 import json
 import re
-from concurrent.futures import Future
 
 import numpy as np
 import pytest
@@ -23,28 +22,7 @@ def folder(tmp_path, write_scan):
     return tmp_path / "in"
 
 
-@pytest.fixture(autouse=True)
-def counts(monkeypatch):
-    """Do the work in this process; gives how many workers were asked for."""
-
-    class Here:
-        def __init__(self, count):
-            counts.append(count)
-
-        def capacity(self):
-            return 1
-
-        def submit(self, function, task):
-            future = Future()
-            future.set_result(function(task))
-            return future
-
-        def close(self, *, at_once):
-            pass
-
-    counts = []
-    monkeypatch.setattr("glsk_o3d.batch.run.LocalWorkers", Here)
-    return counts
+pytestmark = pytest.mark.usefixtures("at_once")
 
 
 def test_some_fail(invoke, folder, tmp_path):
@@ -53,7 +31,7 @@ def test_some_fail(invoke, folder, tmp_path):
     assert result.exit_code == 1
     first, last = result.stderr.splitlines()
     assert first.startswith(f"glsk: warning: {folder / 'bad.ply'}: not a valid .ply file")
-    assert last == f"glsk: error: 1 of 3 scans failed: {tmp_path / 'out' / 'ledger.csv'} says why"
+    assert last == f"glsk: error: 1 of 3 scans failed: {tmp_path / 'out' / 'ledger.jsonl'} says why"
     told = dict(line.rsplit(maxsplit=1) for line in result.stdout.splitlines())
     assert (told["done"], told["skipped"], told["failed"]) == ("2", "0", "1")
     assert float(told["clouds per second"]) > 0
@@ -87,13 +65,13 @@ def test_dry_run(invoke, folder, tmp_path):
     assert told("--quiet").output == ""
 
 
-def test_options_reach_the_run(invoke, folder, scans, tmp_path, counts):
+def test_options_reach_the_run(invoke, folder, scans, tmp_path, at_once):
     words = ("--workers", "2", "--set", "Connector.radius=5%", "--pipeline", "wen2024")
     invoke("batch", "in/a.ply", "in/b.ply", "-o", "out", "--format", "npz", *words)
     stages = read_skeleton(tmp_path / "out" / "a.npz").report.stages
     assert any("Connector(radius='5%'" in stage for stage in stages)
     assert any("RingBuilder(k='published'" in stage for stage in stages)
-    assert counts == [2]
+    assert at_once == [2]
     assert "2 of 1000 points" in invoke("batch", scans / "nan.ply", "-o", "out").stderr
     assert invoke("batch", scans / "nan.ply", "-o", "out", "--drop-invalid").exit_code == 0
 
@@ -111,15 +89,9 @@ def test_progress_tells_how_many_and_how_long(monkeypatch):
     assert re.search(r"done: a\.ply .* 7/10 left: -?\S+", plain)
 
 
-def test_one_skeleton_per_tree_of_a_plot_and_one_of_a_scene_in_tiles(invoke, tmp_path):
+def test_one_skeleton_of_a_scene_in_tiles(invoke, tmp_path):
     rings = np.concatenate([torus(300).points + [3 * i, 0, 0] for i in range(3)])
-    table = np.column_stack([rings, np.repeat([0, 7, 9], 300)])
-    np.savetxt(tmp_path / "plot.csv", table, delimiter=",", header="x,y,z,treeID", comments="")
-    told = json.loads(
-        invoke("batch", "plot.csv", "-o", "out", "--by", "treeID", "--where", "treeID > 0", "--json").stdout
-    )
-    assert (told["done"], told["failed"]) == (2, 0)
-    assert read_skeleton("out/plot-9.ply").vertices[:, 0].min() > 5
+    np.savetxt(tmp_path / "plot.csv", rings, delimiter=",", header="x,y,z", comments="")
     words = ["batch", "plot.csv", "-o", "tiles", "--tiles", "3", "--overlap", "0.5", "--json"]
     told = json.loads(invoke(*words).stdout)
     assert (told["done"] > 3, told["failed"]) == (True, 0)

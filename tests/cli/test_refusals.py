@@ -79,7 +79,7 @@ BEFORE_ANY_RUN = """
     1 run bad.mlx SCANS/ring.ply -o s.ply                  | bad.mlx, line 2: no filter is called 'Generate Skeletn'
     2 run glskeleton SCANS/ring.ply -o s.stl               | s.stl: unknown ending; known are .ply
     2 run points.mlx SCANS/ring.ply -o s.json              | s.json: unknown ending for points or mesh; known are .ply
-    1 run glskeleton y.ply -o t.json                       | the current layer (y.ply) is a skeleton or another line
+    1 run glskeleton y.ply -o t.json                       | y.ply: is a skeleton, not a scan
     1 batch none -o out                                    | none: no such file or folder
     2 batch SCANS/ring.ply -o out --format stl             | unknown ending; known are .ply
     2 batch SCANS/ring.ply -o out --format ,               | nothing to write

@@ -1,7 +1,6 @@
 """What `glsk run` runs, refuses and says."""
 
 import json
-import sys
 
 import numpy as np
 import open3d as o3d
@@ -12,6 +11,7 @@ from glsk_o3d import read_cloud, read_skeleton
 from glsk_o3d.meshlab.layers import Layer
 from glsk_o3d.meshlab.steps import scripts
 
+pytest.importorskip("pymeshlab")
 OURS = '<FilterScript>\n<filter name="{}">\n{}\n</filter>\n</FilterScript>\n'
 
 
@@ -26,13 +26,6 @@ def script(tmp_path):
     return write
 
 
-@pytest.fixture
-def alone(monkeypatch):
-    """Without pymeshlab."""
-    monkeypatch.setitem(sys.modules, "pymeshlab", None)
-
-
-@pytest.mark.usefixtures("alone")
 @pytest.mark.filterwarnings("ignore:uncertain topology:glsk_o3d.SkeletonWarning")
 def test_a_script_of_ours_is_the_pipeline(invoke, scans, script, tmp_path):
     scan = scans / "sample.ply"
@@ -52,26 +45,7 @@ def test_a_script_of_ours_is_the_pipeline(invoke, scans, script, tmp_path):
     np.testing.assert_array_equal(read_skeleton(tmp_path / "s.ply").edges, expected.edges)
 
 
-def test_a_mixed_script_is_what_meshset_does(invoke, scans, tmp_path):
-    pytest.importorskip("pymeshlab")
-    result = invoke("run", "scan_cleanup_then_skeleton", scans / "sample.ply", "-o", "s.json", "--json")
-    assert result.exit_code == 0, result.stderr
-    told = json.loads(result.stdout)
-    names = ["Select Outliers", "Delete Selected Vertices", "Generate Curve Skeleton (GLSkeleton)"]
-    assert [step["filter"] for step in told["steps"]][1:] == names
-    meshes = glsk_o3d.MeshSet()
-    meshes.load_new_mesh(str(scans / "sample.ply"))
-    meshes.load_filter_script(scripts()["scan_cleanup_then_skeleton"])
-    meshes.apply_filter_script()
-    back, expected = read_skeleton(tmp_path / "s.json"), meshes.current_skeleton()
-    np.testing.assert_array_equal(back.vertices, expected.vertices)
-    np.testing.assert_array_equal(back.edges, expected.edges)
-    assert told["steps"][-1]["result"]["vertices"] == len(expected.vertices)
-    assert len(back.points) < 1100
-
-
 def test_the_cross_check_measures_and_writes_nothing(invoke, scans, tmp_path):
-    pytest.importorskip("pymeshlab")
     result = invoke("run", "mesh_crosscheck", scans / "ring.ply", "--json")
     assert result.exit_code == 0, result.stderr
     steps = json.loads(result.stdout)["steps"]
@@ -81,7 +55,6 @@ def test_the_cross_check_measures_and_writes_nothing(invoke, scans, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.usefixtures("alone")
 def test_points_are_written_with_labels_and_colours(invoke, scans, script, tmp_path):
     outputs = [word for ending in ("ply", "xyz") for word in ("-o", f"c.{ending}")]
     result = invoke("run", script("Generate Segmented Cloud (GLSkeleton)"), scans / "sample.ply", *outputs, "-q")
@@ -95,7 +68,6 @@ def test_points_are_written_with_labels_and_colours(invoke, scans, script, tmp_p
 
 
 def test_what_meshlab_cannot_do(refused, script, tmp_path, scans, y):
-    pytest.importorskip("pymeshlab")
     (tmp_path / "torn.ply").write_bytes((scans / "sample.ply").read_bytes()[:2000])
     wrong_layer = script("Hausdorff Distance", '<Param type="RichInt" name="SampledMesh" value="9"/>')
     for words, message in (
@@ -113,14 +85,9 @@ def test_the_list_says_what_each_script_does(invoke):
     told = {each["name"]: each for each in json.loads(invoke("run", "--list", "--json").stdout)}
     assert set(told) == set(scripts()) >= {"glskeleton", "cao2010", "scan_cleanup", "scan_cleanup_then_skeleton"}
     assert all(len(each["doc"]) > 40 for each in told.values())
-    needing = [name for name, each in told.items() if each["needs_pymeshlab"]]
-    assert needing == ["mesh_crosscheck", "scan_cleanup", "scan_cleanup_then_skeleton"]
-    lines = invoke("run", "--list").stdout.splitlines()
-    assert [lines[i - 1].split()[0] for i, line in enumerate(lines) if line.startswith("  needs pymeshlab")] == needing
 
 
 def test_measures_are_plain_and_a_mesh_can_be_written_as_points(invoke, script, tmp_path):
-    pytest.importorskip("pymeshlab")
     mesh = o3d.geometry.TriangleMesh.create_torus(radial_resolution=40)
     assert o3d.io.write_triangle_mesh(str(tmp_path / "m.ply"), mesh)
     name = script("Compute Geometric Measures")
@@ -133,7 +100,6 @@ def test_measures_are_plain_and_a_mesh_can_be_written_as_points(invoke, script, 
     assert n_vertices / 2 < len(read_cloud(tmp_path / "c.xyz").points) <= n_vertices
 
 
-@pytest.mark.usefixtures("alone")
 def test_points_that_are_not_finite_and_loops(invoke, refused, scans, script, tmp_path):
     name, parameter = "Generate Curve Skeleton (GLSkeleton)", "sampler_drop_invalid"
     line = refused(1, "run", script(name), scans / "nan.ply", "-o", "s.ply")

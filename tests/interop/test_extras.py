@@ -54,7 +54,7 @@ asking = {
     "e57": lambda: glsk.read_cloud("scan.e57"),
     "batch": lambda: glsk.batch.run_batch("s.ply", "out", preview=True),
 }
-said = {"notebook": glsk._picture(skeleton)}
+said = {}
 for name, ask in asking.items():
     try:
         ask()
@@ -63,7 +63,7 @@ for name, ask in asking.items():
 print(json.dumps(said))
 """
 NAMED = {
-    **dict.fromkeys(("preview", "report", "plot", "colours", "notebook", "batch"), "pictures"),
+    **dict.fromkeys(("preview", "report", "plot", "colours", "batch"), "pictures"),
     **dict.fromkeys(("graph", "graphml", "read graphml"), "graph"),
     **{"las": "las", "laz": "las", "e57": "e57"},
     **{name: name for name in ("crosscheck", "meshlab", "cluster")},
@@ -84,7 +84,7 @@ def bare(tmp_path):
 def test_without_extras(bare, tmp_path):
     done = bare(WORKS + ASKS)
     assert (done.returncode, done.stderr) == (0, "")
-    said = json.loads(done.stdout.replace("&quot;", '\\"'))
+    said = json.loads(done.stdout)
     assert said.keys() == NAMED.keys()
     for name, message in said.items():
         assert f'pip install "glsk-o3d[{NAMED[name]}]"' in message, name
@@ -107,12 +107,7 @@ def test_the_command_asks_before_the_work(bare, tmp_path):
 PYMESHLAB = 'pymeshlab cannot be imported: pip install "glsk-o3d[meshlab]"\n'
 
 
-def test_a_filter_script_says_at_once_what_it_needs(bare, root):
+def test_a_filter_script_says_at_once_what_it_needs(bare):
     assert bare(COMMAND, "run", "--list").returncode == 0
-    script = root / "filters" / "scan_cleanup.mlx"
-    theirs = re.findall(r'<filter name="([^"]+)"', script.read_text())
     done = bare(COMMAND, "run", "scan_cleanup", "nowhere.ply", "-o", "c.ply")  # the scan is not looked at
-    assert done.returncode == 1
-    assert done.stderr.startswith(f"glsk: error: {script}: MeshLab's own filters ")
-    assert done.stderr.endswith(PYMESHLAB)
-    assert re.findall(r"'([^']+)' \(line \d+\)", done.stderr) == theirs
+    assert (done.returncode, done.stderr) == (1, f"glsk: error: {PYMESHLAB}")

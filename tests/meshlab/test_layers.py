@@ -4,7 +4,6 @@ import numpy as np
 import open3d as o3d
 import pytest
 
-from glsk_o3d import save_skeleton
 from glsk_o3d.meshlab.layers import Layer
 
 
@@ -27,26 +26,6 @@ def test_a_mesh_is_read_as_it_was_written(tmp_path, ending):
     np.testing.assert_array_equal(back.normals, normals)
     np.testing.assert_allclose(back.colors, colors)
     np.testing.assert_array_equal(back.scalars, layer.scalars)
-
-
-def test_what_stl_repeats_for_every_triangle_is_one_vertex(tmp_path):
-    mesh = o3d.geometry.TriangleMesh.create_torus()
-    mesh.compute_triangle_normals()
-    o3d.io.write_triangle_mesh(str(tmp_path / "m.stl"), mesh)
-    back = Layer.read(tmp_path / "m.stl")
-    assert (back.vertices.shape, back.faces.shape) == (np.shape(mesh.vertices), np.shape(mesh.triangles))
-    made = Layer(np.array(mesh.vertices), faces=np.array(mesh.triangles))
-    corners, its = (np.sort(each.vertices[each.faces].mean(axis=1), axis=0) for each in (made, back))
-    np.testing.assert_allclose(its, corners, atol=1e-5)  # six digits
-
-
-@pytest.mark.parametrize("ending", ["ply", "obj", "json"])
-def test_a_skeleton_is_read_with_its_edges(tmp_path, tree, ending):
-    save_skeleton(tree, tmp_path / f"s.{ending}")
-    back = Layer.read(tmp_path / f"s.{ending}")
-    np.testing.assert_array_equal(back.vertices, tree.vertices)
-    np.testing.assert_array_equal(back.edges, tree.edges)
-    assert back.is_skeleton
 
 
 def test_normals_turn_with_the_matrix_of_a_layer():

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 import glsk_o3d as glsk
-from glsk_o3d import editing, to_pymeshlab
+from glsk_o3d import to_pymeshlab
 from glsk_o3d.analysis import segment
 from glsk_o3d.errors import GlskError, InvalidCloudError, InvalidParameterError, MissingPackageError, ScriptError
 from glsk_o3d.io.skeletons import read_skeleton
 from glsk_o3d.meshlab import builtin
 from glsk_o3d.meshlab.layers import Layer
 from glsk_o3d.meshlab.script import read_script
-from glsk_o3d.meshlab.steps import PlainLayers, read_steps
+from glsk_o3d.meshlab.steps import read_steps
 from glsk_o3d.meshlab.verbs import verbs
 from glsk_o3d.samples import sample_object
 
@@ -23,8 +23,6 @@ pymeshlab = pytest.importorskip("pymeshlab")
 POINTS = np.concatenate([sample_object(1000).points, sample_object(100).points, [[9.0, 9, 9], [9, -9, 9]]])
 LARGER = 1.7 * POINTS[:1000] @ np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
 WHOLE = "generate_curve_skeleton_glsk"
-CONTRACT = glsk.pipelines.rings() | glsk.Contractor(reducer=glsk.LPRReducer())
-
 
 OURS = '<FilterScript>\n<filter name="Generate Curve Skeleton (GLSkeleton)"/>\n</FilterScript>'
 
@@ -75,12 +73,11 @@ def test_a_mixed_session_and_its_script_do_what_its_filters_do_by_hand(meshes, t
     scan.meshing_remove_duplicate_vertices()
     radius = 0.02 * scan.current_mesh().bounding_box().diagonal()
     pipeline = glsk.pipelines.default().with_options({"Connector.radius": radius})
-    expected = editing.prune(pipeline(scan.current_mesh().vertex_matrix()), order=3)
+    expected = pipeline(scan.current_mesh().vertex_matrix())
     assert len(expected.edges) > 20
 
     meshes.meshing_remove_duplicate_vertices()
     meshes.generate_curve_skeleton_glsk(connector_radius=pymeshlab.PercentageValue(2))
-    meshes.apply_filter("generate_pruned_skeleton_glsk", order=np.int64(3))
     same(meshes.current_skeleton(), expected)
     again = repeated(meshes, [POINTS], tmp_path / "saved.mlx")
     same(again.current_skeleton(), expected)
@@ -133,7 +130,7 @@ def test_a_filter_that_fails_names_file_line_and_filter(meshes, tmp_path):
         meshes.apply_filter_script()
     assert Path.cwd() == before
     (tmp_path / "s.mlx").write_text(OURS)
-    few = PlainLayers(Layer.of(np.eye(3)))
+    few = holding(np.eye(3))
     with pytest.raises(ScriptError, match=r"s.mlx, line 2: filter 'Generate Curve Skeleton \(GLSkeleton\)': .*8 "):
         few.apply_step(read_steps(tmp_path / "s.mlx")[0])
     meshes.load_filter_script(tmp_path / "s.mlx")
@@ -149,34 +146,30 @@ def test_a_filter_that_fails_names_file_line_and_filter(meshes, tmp_path):
 def test_a_percentage_is_of_the_box_of_the_layer(layer):
     meshes = holding(POINTS[:800], LARGER[:800])
     long = meshes.mesh(layer).bounding_box().diagonal() * 0.05
-    words = (long, np.float64(long), "5%", pymeshlab.PercentageValue(5), "5% of the frame")
-    plain, *others, frame = [made(meshes, WHOLE, connector_radius=value, layer=layer) for value in words]
+    words = (long, np.float64(long), "5%", pymeshlab.PercentageValue(5))
+    plain, *others = [made(meshes, WHOLE, connector_radius=value, layer=layer) for value in words]
     assert all(equal(plain, other) for other in others)
-    assert not equal(plain, frame)
 
 
 def test_words_for_lengths_that_are_not_percentages(meshes):
-    for word, radius in (("2.3% of the frame", "2.3%"), (pymeshlab.PureValue(0.1), 0.1)):
-        meshes.generate_curve_skeleton_glsk(connector_radius=word, layer=0)
-        same(meshes.current_skeleton(), glsk.pipelines.default().with_options({"Connector.radius": radius})(POINTS))
-    for value in ("5 of the frame", "5% of it", "101%", "0%"):
+    meshes.generate_curve_skeleton_glsk(connector_radius=pymeshlab.PureValue(0.1), layer=0)
+    same(meshes.current_skeleton(), glsk.pipelines.default().with_options({"Connector.radius": 0.1})(POINTS))
+    for value in ("5 of it", "5% of the frame", "101%", "0%"):
         with pytest.raises(InvalidParameterError, match=f"^connector_radius = '{value}': .*percentage"):
             meshes.generate_curve_skeleton_glsk(connector_radius=value)
 
 
 def test_scripts_keep_percentages(tmp_path):
     meshes = holding(LARGER)
-    meshes.generate_curve_skeleton_glsk(
-        ringbuilder_radius=pymeshlab.PercentageValue(20), connector_radius="1% of the frame"
-    )
+    meshes.generate_curve_skeleton_glsk(ringbuilder_radius=pymeshlab.PercentageValue(20), connector_radius="1%")
     meshes.save_filter_script(tmp_path / "s.mlx")
     text = (tmp_path / "s.mlx").read_text()
     assert '<Param type="RichAbsPerc" name="ringbuilder_radius" value="20.0%"/>' in text
-    assert '<Param type="RichString" name="connector_radius" value="1% of the frame"/>' in text
-    large = PlainLayers(Layer.of(4096 * LARGER))  # a power of 2: every step is the same but for the exponents
+    assert '<Param type="RichAbsPerc" name="connector_radius" value="1%"/>' in text
+    large = holding(4096 * LARGER)  # a power of 2: every step is the same but for the exponents
     large.apply_step(read_steps(tmp_path / "s.mlx")[0])
     expected = 4096 * meshes.current_mesh().vertex_matrix()
-    np.testing.assert_allclose(large.layer().vertices, expected, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(large.current_mesh().vertex_matrix(), expected, rtol=1e-9, atol=1e-9)
 
 
 def test_points_that_are_dropped_have_no_part_in_the_box():
@@ -252,7 +245,7 @@ def test_layers_that_are_no_scans(meshes):
 
 def test_what_meshlab_does_to_our_layers_is_kept(meshes, tmp_path):
     def saved():
-        meshes.save(tmp_path / "c.ply")
+        meshes.layer().save(tmp_path / "c.ply")
         return Layer.read(tmp_path / "c.ply")
 
     meshes.generate_segmented_cloud_glsk()
@@ -284,17 +277,6 @@ def test_scalars_of_a_skeleton_are_its_radii_and_moved_vertices_its_own(meshes, 
     assert len(moved.points) == 0
 
 
-def test_layers_that_are_gone_are_forgotten(meshes):
-    meshes.generate_curve_skeleton_glsk()
-    skeleton = meshes.mesh(1)
-    again = pymeshlab.Mesh(skeleton.vertex_matrix(), edge_matrix=skeleton.edge_matrix())
-    meshes.clear()
-    assert meshes.mesh_number() == 0
-    meshes.add_points(POINTS)
-    meshes.add_mesh(again)  # as layer 1 was, but nobody says from where
-    assert meshes.layer().skeleton is None
-
-
 # ---- what there is
 
 
@@ -303,11 +285,8 @@ def test_listings_have_both_kinds(capfd, meshes):
     assert {"meshing_remove_duplicate_vertices", *verbs()} <= set(names)
     assert {*verbs()} <= set(dir(glsk.MeshSet))
     assert "curve skeleton" in glsk.MeshSet.generate_curve_skeleton_glsk.__doc__
-    for name in (WHOLE, "generate_pruned_skeleton_glsk"):
-        meshes.print_filter_parameter_list(name)
-    listed = capfd.readouterr().out
-    assert "\nringbuilder_k : " in listed
-    assert "\nlength : Least length of a branch" in listed
+    meshes.print_filter_parameter_list(WHOLE)
+    assert "\nringbuilder_k : " in capfd.readouterr().out
     with pytest.raises(InvalidParameterError, match="did you mean 'generate_curve_skeleton_glsk'"):
         meshes.print_filter_parameter_list("generate_curve_skeletons_glsk")
     meshes.generate_curve_skeleton_glsk(ringbuilder_k=9)

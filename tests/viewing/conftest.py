@@ -1,4 +1,4 @@
-"""A skeleton with its record, and a browser to look at pages with."""
+"""A skeleton, and a browser to look at pages with."""
 
 import io
 
@@ -14,9 +14,8 @@ SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")  # WebGL w
 
 @pytest.fixture(scope="session")
 def run():
-    """A skeleton of the sample object, and the record of its contraction."""
-    recorder = glsk.ContractionRecorder()
-    return glsk.skeletonize(sample_object(1500).points, on_state=recorder), recorder
+    """A skeleton of the sample object."""
+    return glsk.skeletonize(sample_object(1500).points)
 
 
 @pytest.fixture(scope="module")

@@ -38,7 +38,7 @@ def test_a_window_that_cannot_be_opened(tree, monkeypatch):
 
 
 def test_what_it_shows(run, forest, bare):
-    skeleton = run[0]
+    skeleton = run
     shapes = layers(skeleton)
     (cloud,), (lines, thin), (tubes,) = (shapes[name] for name in ("cloud", "skeleton", "radius tubes"))
     np.testing.assert_array_equal(np.asarray(cloud.points), skeleton.points)
@@ -65,6 +65,6 @@ def test_keys_show_and_hide(run, monkeypatch):
     window.run.side_effect = press
     monkeypatch.setattr("glsk_o3d.viewing.window.has_display", lambda: True)
     monkeypatch.setattr("open3d.visualization.VisualizerWithKeyCallback", lambda: window)
-    show(run[0])
+    show(run)
     assert counts == [3, 4, 3, 1, 0]  # cloud, lines and their tubes; radius tubes; without these; nothing
     window.destroy_window.assert_called_once()

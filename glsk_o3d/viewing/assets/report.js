@@ -4,14 +4,14 @@
   const element = (id) => document.getElementById(id);
   const canvas = element("view");
   const gl = canvas.getContext("webgl2", { alpha: false, antialias: true, preserveDrawingBuffer: true });
-  if (!gl) return; // the still picture stays
+  if (!gl) return; // the words that say so stay
   document.body.classList.remove("still");
   canvas.addEventListener("webglcontextlost", () => document.body.classList.add("still"));
 
   // ---------------------------------------------------------------------------------------------- what is shown
   const data = JSON.parse(element("data").textContent);
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
-  const positions = new Int16Array(bytes(data.positions)); // of all points: the input, then after each solve
+  const positions = new Int16Array(bytes(data.positions)); // of all points
   const vertexOfPoint = new Int32Array(bytes(data.vertex_of_point));
   const branchOfPoint = new Int32Array(bytes(data.branch_of_point));
   const vertices = new Float32Array(bytes(data.vertices));
@@ -21,7 +21,6 @@
   const branchOfEdge = new Int32Array(bytes(data.branch_of_edge));
   const measures = { radius: radii, confidence: new Float32Array(bytes(data.confidence)) };
   const nPoints = vertexOfPoint.length, nPieces = edges.length / 2;
-  const last = data.captions.length - 1; // the last solve
   const GREY = [136, 142, 148];
 
   // ------------------------------------------------------------------------------------------------- programs
@@ -50,11 +49,11 @@
     return { made, uniform, attribute };
   };
   const points = program(CAMERA + `
-    in vec3 before; in vec3 after; in vec3 colour;
-    uniform float between; uniform float size; uniform vec3 paper;
+    in vec3 place; in vec3 colour;
+    uniform float size; uniform vec3 paper;
     out vec3 shade;
     void main() {
-      vec3 q = seen(mix(before, after, between));
+      vec3 q = seen(place);
       gl_Position = onScreen(q);
       gl_PointSize = max(size / -q.z, 2.0);
       shade = mix(colour, paper, 0.65 * haze(q));
@@ -123,6 +122,7 @@
 
   const cloudShape = gl.createVertexArray();
   gl.bindVertexArray(cloudShape);
+  attach(points.attribute("place"), places, 3, gl.SHORT, 0, 0);
   attach(points.attribute("colour"), pointColours, 3, gl.UNSIGNED_BYTE, 0, 0);
   const pieceShape = gl.createVertexArray();
   gl.bindVertexArray(pieceShape);
@@ -180,7 +180,7 @@
     [axes[i], axes[j]] = [axes[i].map((a, k) => c * a + s * axes[j][k]), axes[j].map((b, k) => c * b - s * axes[i][k])];
   };
   const fit = () => { // the nearest distance from which everything is in the picture
-    const [fx, fy] = focal(), around = nPoints ? positions.subarray(0, 3 * nPoints) : vertices;
+    const [fx, fy] = focal(), around = nPoints ? positions : vertices;
     const unit = nPoints ? 1 / 32767 : 1;
     [aim, away] = [[0, 0, 0], 0.05];
     for (let at = 0; at < around.length; at += 3) {
@@ -209,7 +209,7 @@
   };
 
   // -------------------------------------------------------------------------------------------------- drawing
-  let shown = 0, wanted = 0, playing = false, due = false, moving = false, clock = 0;
+  let due = false;
   const drawPieces = (thin, opacity, plain = [0, 0, 0, 0]) => {
     gl.uniform1f(pieces.uniform("thin"), thin);
     gl.uniform4fv(pieces.uniform("plain"), plain);
@@ -231,12 +231,8 @@
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LEQUAL);
     if (nPoints && element("cloud").checked) {
-      const from = Math.max(Math.min(Math.floor(shown), last - 1), 0), to = Math.min(from + 1, last);
       gl.bindVertexArray(cloudShape);
-      attach(points.attribute("before"), places, 3, gl.SHORT, 0, 6 * nPoints * from);
-      attach(points.attribute("after"), places, 3, gl.SHORT, 0, 6 * nPoints * to);
       use(points);
-      gl.uniform1f(points.uniform("between"), shown - from);
       gl.uniform1f(points.uniform("size"), Math.min(0.55 / Math.sqrt(nPoints), 0.009) * ZOOM * canvas.height / 2);
       gl.uniform3fv(points.uniform("paper"), paper);
       gl.drawArrays(gl.POINTS, 0, nPoints);
@@ -260,59 +256,17 @@
         drawPieces(thin, 1, plain);
       }
     }
-    canvas.dataset.shown = shown;
-  };
-  const tick = (now) => {
-    due = false;
-    const step = (Math.max(now - clock, 0) / 1000) * (playing ? 1 : 4); // solves
-    clock = now;
-    const calm = matchMedia("(prefers-reduced-motion: reduce)").matches && !playing;
-    shown = calm || Math.abs(wanted - shown) <= step ? wanted : shown + step * Math.sign(wanted - shown);
-    if (playing) {
-      element("solve").value = Math.round(shown);
-      say(Math.round(shown));
-      if (shown === last) stop();
-    }
-    draw();
-    moving = shown !== wanted;
-    if (moving) redraw();
   };
   const redraw = () => {
     if (due) return;
     due = true;
-    if (!moving) clock = performance.now();
-    moving = shown !== wanted;
-    requestAnimationFrame(tick);
-  };
-  const say = (solve) => {
-    element("caption").textContent = data.captions[solve];
-    document.querySelectorAll("[data-solve]").forEach((row) => row.classList.toggle("now", +row.dataset.solve === solve));
-  };
-  const stop = () => {
-    playing = false;
-    element("play").textContent = "Play";
+    requestAnimationFrame(() => {
+      due = false;
+      draw();
+    });
   };
 
   // ------------------------------------------------------------------------------------------------- controls
-  element("solve").max = last;
-  element("solves").hidden = last < 1;
-  element("solve").addEventListener("input", (event) => {
-    stop();
-    wanted = +event.target.value;
-    say(wanted);
-    redraw();
-  });
-  element("play").addEventListener("click", () => {
-    if (playing) {
-      wanted = shown = Math.round(shown);
-      stop();
-    } else {
-      if (shown >= last) shown = 0;
-      [playing, wanted] = [true, last];
-      element("play").textContent = "Pause";
-    }
-    redraw();
-  });
   for (const name of Object.keys(data.ranges)) element("colour").add(new Option(name, name));
   element("colour").addEventListener("change", paint);
   for (const name of ["cloud", "skeleton", "tubes"]) element(name).addEventListener("change", () => redraw());
@@ -407,6 +361,5 @@
   }).observe(canvas);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   look(data.view, true);
-  say(0);
   paint();
 })();
