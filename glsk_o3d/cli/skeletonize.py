@@ -35,7 +35,7 @@ def skeletonize(
     labelled: Annotated[
         Path | None, option("CLOUD", "Also write the scan with branch, radius, ... of every point, as ply.")
     ] = None,
-    save_recipe: Annotated[Path | None, option("FILE", "Also write the pipeline to a json or toml file.")] = None,
+    save_recipe: Annotated[Path | None, option("FILE", "Also write the pipeline to a json file.")] = None,
     stream: Annotated[
         bool | None, Option("--stream/--no-stream", help="Read only a sample; by default if over ten million points.")
     ] = None,
@@ -72,9 +72,7 @@ def skeletonize(
     ]
     if all(result.path is None for result in results):
         raise WrongUsage("nothing to write: give -o, --tubes or --labelled, a --preview or a --report")
-    saved = Output(
-        save_recipe, (".json", ".toml"), "file is a recipe", lambda _, path: recipes.save_recipe(chosen, path)
-    )
+    saved = Output(save_recipe, (".json",), "file is a recipe", lambda _, path: recipes.save_recipe(chosen, path))
     check_outputs([*results, saved], scan, Path(pipeline))
     if tubes is not None or labelled is not None:
         require("matplotlib")  # for the colours of branches

@@ -65,8 +65,8 @@ def test_parameters_choose_pipeline_and_settings(ros, cloud, points, tmp_path, r
     node = ros.node(pipeline="tree", set=["k=20"])
     node.on_cloud(cloud)
     np.testing.assert_array_equal(line_ends(node.published[0][1], rows), other.vertices[other.edges].reshape(-1, 3))
-    glsk.save_recipe(glsk.pipelines.tree().with_options(k=20), tmp_path / "mine.toml")
-    same = ros.node(pipeline=str(tmp_path / "mine.toml"))
+    glsk.save_recipe(glsk.pipelines.tree().with_options(k=20), tmp_path / "mine.json")
+    same = ros.node(pipeline=str(tmp_path / "mine.json"))
     same.on_cloud(cloud)
     np.testing.assert_array_equal(line_ends(same.published[0][1], rows), line_ends(node.published[0][1], rows))
 
