@@ -75,7 +75,7 @@ def stems(
     output: Output = None,
     markdown: Markdown = False,
 ) -> None:
-    """Stem diameters and volumes with their intervals, of trees that one to three scanners see.
+    """Stem diameters and volumes of trees that one to three scanners see.
 
     On the seeds from 0 the numbers were chosen, those from 100 show what they are worth.
     """

@@ -28,7 +28,7 @@ RADIUS_SAMPLES = 8  # derived: places along a cylinder at which its radius is ta
 class Cylinders(Rows, row="cylinder"):
     """One row per cylinder, from the root outwards along each branch.
 
-    Lengths are in the cloud's units. Rows and CSV also have ``diameter``, ``area`` and ``volume``.
+    Lengths are in the cloud's units. Rows and CSV also have ``volume``.
 
     Attributes
     ----------
@@ -52,22 +52,12 @@ class Cylinders(Rows, row="cylinder"):
     confidence: np.ndarray
 
     @property
-    def diameter(self) -> np.ndarray:
-        """Of each cylinder."""
-        return 2 * self.radius
-
-    @property
     def volume(self) -> np.ndarray:
         """Of each cylinder, in the cube of the cloud's units."""
         return np.pi * self.radius**2 * self.length
 
-    @property
-    def area(self) -> np.ndarray:
-        """Lateral surface of each cylinder, in the square of the cloud's units."""
-        return 2 * np.pi * self.radius * self.length
-
     def _columns(self) -> dict[str, list]:
-        return super()._columns() | {name: getattr(self, name).tolist() for name in ("diameter", "area", "volume")}
+        return super()._columns() | {"volume": self.volume.tolist()}
 
 
 def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
