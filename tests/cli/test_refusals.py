@@ -32,14 +32,12 @@ TABLE = """
     1 rig o.ply -o r.glb                                   | 1 loop(s): pass cut_loops=True (--cut-loops) to drop
     1 rig bare.obj -o r.glb                                | a rig needs radii or points: read the skeleton from
     2 grasps rod.npz --opening -1                          | max_opening = -1.0: must be above 0
-    2 grasps rod.npz --opening 1 --plane 0,0,1             | --plane 0,0,1: write 4 numbers with commas
-    2 grasps rod.npz --opening 1 --plane 0,0,0,1           | is no plane
-    2 grasps rod.npz --opening 1 --cone z                  | --cone ,z: write 4 numbers
-    2 grasps rod.npz --opening 1 --cone z,270              | the angle of cone = 270.0: must be
+    2 grasps rod.npz --opening 1 --plane 0,0,1             | must be finite a, b, c, d of ax + by + cz + d = 0
+    2 grasps rod.npz --opening 1 --plane 0,0,0,1           | must be finite a, b, c, d of ax + by + cz + d = 0
     2 grasps rod.npz --opening 1 -o g.ply                  | the grasps are JSON or CSV and its name ends in .json
     2 grasps y.ply --opening 1                             | has no confidence, perhaps due to its file: give min_con
     2 grasps y.ply --opening 1 --min-confidence 0          | has no points of the object: give cloud=
-    1 grasps rod.npz --opening 1 --scene none.ply          | none.ply: no such file
+    1 grasps rod.npz --opening 1 --cloud none.ply          | none.ply: no such file
     1 evaluate y.ply SCANS/ring.ply --truth none.npz       | none.npz: not a valid truth: the truth has no nodes
     1 evaluate dot.ply SCANS/ring.ply                      | dot.ply: the skeleton has no edge with a length
     1 evaluate y.ply few.xyz                               | few.xyz: no part of the skeleton has 6 points around it
