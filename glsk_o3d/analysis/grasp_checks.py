@@ -47,12 +47,12 @@ def free_ways(
     surface = cells(points, CLOSE_POINTS * min(gripper.finger[:2]))
     depth = np.minimum(gripper.reach, width / 2)
     shape = ways.approach.shape[:2]
-    reasons: dict[str, np.ndarray] = {}
+    reasons: dict[str, Any] = {}
     opening, seen, free = np.full(shape, np.nan), np.zeros(shape, int), np.zeros(shape, bool)
     for times in WIDER:
         wide = np.minimum(width + times * clearance, gripper.max_opening)
         low, high = swept(gripper, wide, depth, clearance, far)
-        asked, found = ~free, {}
+        asked, found = ~free, dict[str, Any]()
         if len(points):
             touched = hits(ways, surface, low, high, asked).any(axis=2)
             asked &= ~touched

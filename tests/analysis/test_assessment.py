@@ -23,7 +23,6 @@ def test_a_tube_or_half_of_it_and_a_line_beside_its_axis(pipe, d, least, centred
     assert found.centredness == pytest.approx(centredness, abs=1e-12)
     assert found.boundedness == boundedness
     assert found.topology == 1
-    np.testing.assert_allclose(found.edge_centredness, [centredness], atol=1e-12)
 
 
 def test_what_is_seen_of_a_tube_from_outside(pipe):
@@ -77,7 +76,6 @@ def test_false_loops_open_less_than_their_tube(pipe, curve):
     )
     found = assess(square, pipe.points)
     assert (found.loops, found.wide_loops, found.topology) == (1, 0, 0)
-    assert np.isnan(found.edge_centredness).any()  # at its junctions
 
 
 def test_assessments_have_no_unit(axis_of):
