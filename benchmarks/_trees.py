@@ -337,7 +337,7 @@ def measure_stem(seed: int) -> dict[str, float]:
     return said | true | more | dict(scanners=scanned.scanners, density=scanned.density)
 
 
-def measure_model(cloud: Path, model: Path, unit: str) -> dict:
+def measure_model(cloud: Path, model: Path, unit: float) -> dict:
     """What we and a cylinder model say of a scanned tree."""
     found, theirs = tree_measures(pipelines.tree()(read_cloud(cloud)), unit=unit), read_cylinder_model(model)
     mine = dict(height=found.height, stem_diameter=found.stem_diameter, volume=float(sum(found.volume)))

@@ -92,7 +92,7 @@ def stems(
 @app.command()
 def models(
     paths: Annotated[list[Path], typer.Argument(metavar="CLOUD MODEL...", exists=True, dir_okay=False)],
-    unit: Annotated[str, typer.Option("--unit", help="Of the clouds: m, cm, mm; models are in metres.")] = "m",
+    unit: Annotated[float, typer.Option("--unit", help="Of the clouds, in metres, as models are.")] = 1,
     output: Output = None,
     markdown: Markdown = False,
 ) -> None:

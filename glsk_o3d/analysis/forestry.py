@@ -12,9 +12,10 @@ from ..errors import InvalidParameterError, SkeletonWarning
 from ..numerics.neighbourhoods import plane_axes
 from ..numerics.vectors import AXES, TINY, along_axis, norm
 from ..numerics.vectors import unit as directions
+from ..parameters import check_number
 from ..skeleton import Skeleton
 from .circles import CircleFit, fit_circle
-from .trees import OUTSIDE, Cylinders, cylinders, metres
+from .trees import OUTSIDE, Cylinders, cylinders
 
 BREAST_HEIGHT = 1.3  # published: metres above the ground at which foresters measure stems
 TALLEST_TREE = 116.07  # published: metres, Hyperion, the tallest tree known, as measured in 2019
@@ -65,7 +66,7 @@ class TreeMeasures:
     doubts: tuple[str, ...]
 
 
-def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, unit: float | str = 1.0) -> TreeMeasures:
+def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, unit: float = 1.0) -> TreeMeasures:
     """Measure a tree as foresters do.
 
     Parameters
@@ -76,8 +77,8 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
         See `cylinders`.
     up : {"x", "y", "z", "-x", "-y", "-z"}, optional
         Axis that points up. By default that of `root` here or in the pipeline `tree`, or else ``"z"``.
-    unit : float or {"m", "cm", "mm", "in", "ft"}
-        One unit of the cloud, in metres or by its name.
+    unit : float
+        One unit of the cloud, in metres: 0.001 for millimetres.
 
     Returns
     -------
@@ -86,7 +87,7 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
     Raises
     ------
     InvalidParameterError
-        See `cylinders`; or `up` is no axis, or `unit` is neither positive nor one of these.
+        See `cylinders`; or `up` is no axis, or `unit` is not positive.
 
     Warns
     -----
@@ -107,7 +108,7 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
     up = next(axis for axis in grown if isinstance(axis, str) and axis in AXES) if up is None else up
     if up not in AXES:
         raise InvalidParameterError(f"up = {up!r}: must be 'x', 'y' or 'z', with a minus where that points down")
-    unit = metres(unit)
+    check_number("unit", unit, low=0, open_low=True)
     pieces = cylinders(skeleton, root)
     ground = pieces.start_point[0]
 
@@ -182,7 +183,7 @@ def _find_doubts(
     if highest > TALLEST_TREE:
         doubts.append(
             f"the tree is {highest:.4g} m high, and none is known above {TALLEST_TREE:.0f} m: is a unit of the cloud "
-            f"{unit:g} m? name it: unit='mm', --unit mm"
+            f"{unit:g} m? give its metres, such as 0.001"
         )
     if unknown and highest > BREAST_HEIGHT:
         doubts.append(f"the diameter of the stem at {BREAST_HEIGHT} m is not known: {unknown}")

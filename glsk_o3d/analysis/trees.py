@@ -14,7 +14,6 @@ from ..numerics.vectors import unit as directions
 from .branches import branch_table
 from .rows import Rows
 
-METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}  # derived: of the international inch and foot
 PIECE_LENGTH = 4.0  # derived: radii; the chord of a bend as sharp as that is 3 % too short
 TIP_QUANTILE = 0.95  # fitted: share of the points at a tip that its cylinder reaches
 OUTSIDE = 3.0  # fitted: radii aside of a tip, from which on points do not say how far it reaches
@@ -191,14 +190,3 @@ def _place_beyond(curve: np.ndarray, along: np.ndarray, lengths: np.ndarray) -> 
         unit = way / max(float(np.linalg.norm(way)), TINY)
         places = places + np.maximum(more, 0)[:, None] * unit
     return places
-
-
-def metres(unit: float | str) -> float:
-    """A unit of length in metres, given as that or by its name: ``"mm"`` is 0.001."""
-    try:
-        value = METRES[unit] if isinstance(unit, str) and unit in METRES else float(unit)
-    except (TypeError, ValueError):
-        value = np.nan
-    if not 0 < value < np.inf:
-        raise InvalidParameterError(f"unit = {unit!r}: must be metres, above 0, or one of {', '.join(METRES)}")
-    return value

@@ -270,10 +270,6 @@ def test_print():
     assert len(others) == 14
     assert {len(line) for line in (first, *others)} == {len(names)}
     assert str(supported).splitlines()[2].split().count("0.5") == 2  # it has a confidence as well
-    html = table._repr_html_()
-    assert html.startswith(f"<p>{table!r}</p><table")
-    assert html.count("<tr>") == len(table) + 1
-    assert html.count("<td ") == len(table) * html.count("<th ")
 
 
 def test_csv_and_dicts(tmp_path):

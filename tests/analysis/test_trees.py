@@ -117,7 +117,7 @@ def test_a_branch_begins_where_it_has_left_its_parent(thin, degrees):
     assert table.length[table.order == 1].sum() == pytest.approx(10 - inside, abs=0.06)
 
 
-@pytest.mark.parametrize("options", [{"up": "w"}, {"up": "--z"}, {"unit": 0}, {"unit": np.nan}, {"unit": "mile"}])
+@pytest.mark.parametrize("options", [{"up": "w"}, {"up": "--z"}, {"unit": 0}, {"unit": np.nan}, {"unit": "mm"}])
 def test_wrong_options(options):
     with pytest.raises(InvalidParameterError, match=r"up = |unit = "):
         tree_measures(by_hand(), **options)

@@ -84,7 +84,7 @@ def test_units_what_is_up_and_cylinders_in_the_units_of_the_file(invoke, tmp_pat
         json.loads(invoke("tree", y, "--json", "--root", "z", "--up", up).stdout)["height"] for up in ("z", "-z")
     )
     assert turned != metres
-    facts = json.loads(invoke("tree", y, "-o", "c.csv", "--unit", "mm", "--root", "z", "--json").stdout)
+    facts = json.loads(invoke("tree", y, "-o", "c.csv", "--unit", "0.001", "--root", "z", "--json").stdout)
     assert (facts["height"], facts["files"]) == (pytest.approx(0.001 * metres), ["c.csv"])
     cylinders(read_skeleton(tmp_path / y), "z").to_csv(tmp_path / "expected.csv")
     assert (tmp_path / "c.csv").read_bytes() == (tmp_path / "expected.csv").read_bytes()
@@ -95,5 +95,5 @@ def test_a_tree_taller_than_any_is_in_doubt(invoke, tmp_path, y):
     large = replace(small, vertices=1000 * small.vertices, radii=1000 * small.radii)
     save_skeleton(large, tmp_path / "mm.ply")
     first, _ = invoke("tree", "mm.ply", "--up", "z", "--root", "z").stderr.splitlines()
-    assert first.endswith("none is known above 116 m: is a unit of the cloud 1 m? name it: unit='mm', --unit mm")
-    assert invoke("tree", "mm.ply", "--unit", "mm", "--up", "z", "--root", "z").stderr == ""
+    assert first.endswith("none is known above 116 m: is a unit of the cloud 1 m? give its metres, such as 0.001")
+    assert invoke("tree", "mm.ply", "--unit", "0.001", "--up", "z", "--root", "z").stderr == ""

@@ -14,7 +14,7 @@ TABLE = """
     2 branches y.ply --root 4                              | root = 4: there are vertices 0 to 3
     2 branches y.ply -o y.txt                              | y.txt: the table is CSV and its name ends in .csv
     2 tree y.ply --root a,b,c                              | root = 'a,b,c': must be an axis
-    2 tree y.ply --unit 0                                  | unit = '0': must be metres, above 0, or one of m, cm, mm
+    2 tree y.ply --unit 0                                  | unit = 0.0: must be above 0
     2 tree o.ply                                           | 1 loops: cylinders need a tree; see pipelines.tree()
     2 tree two.json                                        | 2 components: cylinders need one tree
     2 tree y.ply -o c.xlsx                                 | c.xlsx: the file is a table of cylinders and its name ends
