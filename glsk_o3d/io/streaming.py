@@ -186,8 +186,8 @@ def annotate_file(
             for block in read_blocks(path, where=where):
                 if not {*names} <= block.attributes.keys():
                     raise changed
-                label = labels(skeleton, *vertex_of_cloud(skeleton, block.positions), "branch")
-                table = ply.rows_of(_columns(block, names, label))
+                points, vertex = vertex_of_cloud(skeleton, block.positions)
+                table = ply.rows_of(_columns(block, names, labels(skeleton, points, vertex, "branch")))
                 if row is None:
                     stream.write(ply.header_of(table.dtype, n))
                 elif row != table.dtype:

@@ -90,12 +90,8 @@ def test_a_root_inside_a_branch_and_at_a_junction():
     assert np.isnan(fork.angle[fork.level == 0]).all()
 
 
-def test_y_junction_exactly_and_from_its_cloud():
+def test_y_junction_from_its_cloud():
     sample = samples.y_junction(2000)
-    table = branch_table(axis_of(sample))
-    np.testing.assert_allclose(table.length, 0.5)
-    np.testing.assert_allclose(table.angle[1:], 40)
-    np.testing.assert_allclose(table.mean_radius, [0.09, 0.08, 0.08])
     found = branch_table(skeletonize(sample.points), root=(0, 0, -1))
     assert sorted(found.level.tolist()) == [0, 1, 1]
     np.testing.assert_allclose(found.angle[found.level == 1], 40, atol=4)

@@ -12,7 +12,6 @@ from glsk_o3d import (
     Skeleton,
     SkeletonWarning,
     samples,
-    skeletonize,
 )
 from glsk_o3d.analysis import Gripper, grasp_candidates, grasp_checks
 
@@ -207,28 +206,6 @@ def test_fingers_reach_as_far_as_the_part_and_no_farther_than_they_can():
     thin = replace(thin, radii=[0.02, 0.02], points=thin.points * [1, 0.2, 0.2])
     np.testing.assert_allclose(grasp(thin).depth, 0.02)
     np.testing.assert_allclose(grasp(rod()).depth, HAND.reach)
-
-
-# ------------------------------------------------------------------------------------------------- against exact shapes
-
-
-def test_nothing_is_in_the_object_by_its_formula():
-    sample = samples.sample_object(1500, 0, 0, "two_rings")
-    skeleton = skeletonize(sample.points)
-
-    def pierced(grasps):
-        found = []
-        for pose, *boxes in zip(grasps.poses, *grasps.gripper.boxes(grasps.opening, grasps.depth), strict=True):
-            grids = [np.meshgrid(*np.linspace(*box, 10).T) for box in zip(*boxes, strict=True)]
-            places = np.concatenate([np.stack(grid, axis=-1).reshape(-1, 3) for grid in grids])
-            places = places @ pose[:3, :3].T + pose[:3, 3]
-            found.append((samples.signed_distance(places, sample.nodes, sample.edges, sample.radii) < 0).any())
-        return np.array(found)
-
-    assert pierced(grasp_candidates(skeleton, 0.3, cloud=())[:8]).any()
-    safe = grasp_candidates(skeleton, 0.3, spacing=0.2)
-    assert len(safe) >= 8
-    assert not pierced(safe[:8]).any()
 
 
 # --------------------------------------------------------------------------------------------------------------- errors
