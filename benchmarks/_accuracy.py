@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import time
+from dataclasses import asdict
 from pathlib import Path
 from statistics import median
 
@@ -61,7 +62,7 @@ def measure(case: Case, pipeline: Pipeline, repeat: int = 1) -> dict:
         skeleton = pipeline(points)
         seconds.append(time.process_time() - start)
     facts = dict(cpu=median(seconds), vertices=len(skeleton.vertices), solves=len(skeleton.report.iterations))
-    return facts | compare(skeleton, truth).as_dict()
+    return facts | asdict(compare(skeleton, truth))
 
 
 def measured(found: list[Case], pipelines: dict[str, Pipeline], jobs: int, repeat: int = 1) -> list[dict]:

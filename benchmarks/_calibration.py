@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import NamedTuple
 
@@ -174,7 +175,7 @@ def measure(case: Case, weights: Weights) -> dict[str, float]:
     kept = {about: ASKED[about] for about in weights}
     try:
         ASKED.update({about: ASKED[about]._replace(weights=them) for about, them in weights.items()})
-        return compare(default()(points), truth).as_dict()
+        return asdict(compare(default()(points), truth))
     finally:
         ASKED.update(kept)
 

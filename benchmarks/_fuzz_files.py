@@ -222,10 +222,8 @@ def _skeletons(folder: Path) -> dict[str, bytes]:
 
 
 def _others(folder: Path) -> dict[str, bytes]:
-    found = {}
-    for ending in (".json", ".toml"):
-        save_recipe(glsk.pipelines.default(), folder / f"r{ending}")
-        found[f"recipe {ending}"] = (folder / f"r{ending}").read_bytes()
+    save_recipe(glsk.pipelines.default(), folder / "r.json")
+    found = {"recipe .json": (folder / "r.json").read_bytes()}
     script = '<!DOCTYPE FilterScript>\n<FilterScript>\n <filter name="Generate Curve Skeleton (GLSkeleton)">\n'
     script += '  <Param type="RichAbsPerc" name="connector_radius" value="2%"/>\n </filter>\n</FilterScript>\n'
     found["script .mlx"] = script.encode()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from statistics import fmean
@@ -328,43 +328,38 @@ def measure_tree(seed: int, condition: str) -> dict[str, float]:
 
 
 def measure_stem(seed: int) -> dict[str, float]:
-    """Diameter and volume of a scanned tree, what they are said to be, and their intervals."""
+    """Diameter and volume of a scanned tree, as found and as they are."""
     scanned = scan(seed)
     found = tree_measures(pipelines.tree()(scanned.points))
-    facts = asdict(found)
-    said = {name: facts[name] for name in ("stem_diameter", "stem_interval", "stem_arc", "stem_rms", "stem_points")}
-    wood = dict(volume=sum(found.volume), volume_interval=found.volume_interval, traced_volume=found.traced_volume)
+    said = dict(stem_diameter=found.stem_diameter, stem_arc=found.stem_arc, volume=sum(found.volume))
     true = dict(true_diameter=scanned.stem_diameter, true_volume=scanned.volume)
     more = dict(height=found.height, noise=scanned.noise, doubts=len(found.doubts))
-    return said | wood | true | more | dict(scanners=scanned.scanners, density=scanned.density)
+    return said | true | more | dict(scanners=scanned.scanners, density=scanned.density)
 
 
-def measure_model(cloud: Path, model: Path, unit: str) -> dict:
-    """What we and a cylinder model say of a scanned tree, and in which intervals we expect the truth."""
+def measure_model(cloud: Path, model: Path, unit: float) -> dict:
+    """What we and a cylinder model say of a scanned tree."""
     found, theirs = tree_measures(pipelines.tree()(read_cloud(cloud)), unit=unit), read_cylinder_model(model)
     mine = dict(height=found.height, stem_diameter=found.stem_diameter, volume=float(sum(found.volume)))
     said = {name: (value, getattr(theirs, name)) for name, value in mine.items()}
-    return said | dict(stem_interval=found.stem_interval, volume_interval=found.volume_interval, doubts=found.doubts)
+    return said | dict(doubts=found.doubts)
 
 
 def model_tables(rows: list[dict]) -> Tables:
-    """A line for each tree: ours, with intervals, and theirs."""
+    """A line for each tree: ours and theirs."""
     lines = []
     for row in rows:
         if "failure" in row:
-            lines.append([row["tree"], *"-" * 8, row["failure"]])
+            lines.append([row["tree"], *"-" * 6, row["failure"]])
             continue
-        stem, volumes = (f"{low:.3g} to {high:.3g}" for low, high in (row["stem_interval"], row["volume_interval"]))
-        pairs = {name: [f"{it:.3g}" for it in row[name]] for name in ("height", "stem_diameter", "volume")}
-        (ours_d, theirs_d), (ours_v, theirs_v) = pairs["stem_diameter"], pairs["volume"]
-        doubts = "; ".join(row["doubts"])
-        lines.append([row["tree"], *pairs["height"], ours_d, stem, theirs_d, ours_v, volumes, theirs_v, doubts])
-    header = ["", "height m", "theirs", "stem m", "interval", "theirs", "volume m3", "interval", "theirs", "doubts"]
+        pairs = [f"{it:.3g}" for name in ("height", "stem_diameter", "volume") for it in row[name]]
+        lines.append([row["tree"], *pairs, "; ".join(row["doubts"])])
+    header = ["", "height m", "theirs", "stem m", "theirs", "volume m3", "theirs", "doubts"]
     return [("Scanned trees, and cylinder models of them", header, lines)]
 
 
 def stem_tables(rows: list[dict]) -> Tables:
-    """Good diameters, and intervals that hold the truth, by seeds and scanners; and a line for each tree."""
+    """Good diameters and volumes by seeds and scanners; and a line for each tree."""
     lines = []
     for seeds in dict.fromkeys(row["seeds"] for row in rows):
         here = pick(rows, seeds=seeds)
@@ -372,49 +367,30 @@ def stem_tables(rows: list[dict]) -> Tables:
         for label, some in (*sets, (f"{seeds} seeds, all", good(here))):
             if some:
                 lines.append([label, *_stem_cells(some)])
-    header = ["", "trees", "within 3 %", "intervals hold", "median error %", "half interval %"]
-    header += ["volume: median error %", "its intervals hold"]
+    header = ["", "trees", "within 3 %", "median error %", "volume: median error %"]
     found = [("Stem diameters at 1.3 m, and volumes, of scanned trees", header, lines)]
     lines = []
     for row in rows:
         cells = [row["seeds"], str(row["tree"])]
         if "failure" in row:
-            lines.append([*cells, *"-" * 9, row["failure"]])
+            lines.append([*cells, *"-" * 6, row["failure"]])
             continue
-        low, high = row["stem_interval"]
-        stem = (row["true_diameter"], row["stem_diameter"], low, high)
+        stem = (row["true_diameter"], row["stem_diameter"])
         cells += [str(row["scanners"]), *(f"{100 * it:.2f}" for it in stem), f"{row['stem_arc']:.0f}"]
-        cells += [f"{1000 * row['stem_rms']:.1f}", f"{row['true_volume']:.3f}", f"{row['volume']:.3f}", ""]
+        cells += [f"{row['true_volume']:.3f}", f"{row['volume']:.3f}", ""]
         lines.append(cells)
-    header = [
-        "seeds",
-        "tree",
-        "scanners",
-        "true cm",
-        "found cm",
-        "from",
-        "to",
-        "arc",
-        "rms mm",
-        "true m3",
-        "found m3",
-        "note",
-    ]
+    header = ["seeds", "tree", "scanners", "true cm", "found cm", "arc", "true m3", "found m3", "note"]
     return [*found, ("Each tree", header, lines)]
 
 
 def _stem_cells(rows):
-    """How good the diameters and volumes of some trees are, and their intervals."""
-    true, said = (np.array([row[name] for row in rows]) for name in ("true_diameter", "stem_diameter"))
-    low, high = np.array([row["stem_interval"] for row in rows]).T
-    error = np.abs(said / true - 1)
-    wood = np.array([row["true_volume"] for row in rows])
-    least, most = np.array([row["volume_interval"] for row in rows]).T
-    volume = np.abs(np.array([row["volume"] for row in rows]) / wood - 1)
-    held, volumes = (low <= true) & (true <= high), (least <= wood) & (wood <= most)
-    shares = [f"{(error < 0.03).sum()}", f"{held.sum()}", f"{100 * np.nanmedian(error):.2f}"]
-    more = [f"{100 * np.nanmedian((high - low) / true / 2):.2f}", f"{100 * np.median(volume):.1f}", f"{volumes.sum()}"]
-    return [str(len(rows)), *shares, *more]
+    """How good the diameters and volumes of some trees are."""
+    stem, wood = (
+        np.abs([row[said] / row[true] - 1 for row in rows])
+        for said, true in (("stem_diameter", "true_diameter"), ("volume", "true_volume"))
+    )
+    shares = [f"{(stem < 0.03).sum()}", f"{100 * np.nanmedian(stem):.2f}", f"{100 * np.median(wood):.1f}"]
+    return [str(len(rows)), *shares]
 
 
 def measure_tables(rows: list[dict]) -> Tables:

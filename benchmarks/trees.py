@@ -75,7 +75,7 @@ def stems(
     output: Output = None,
     markdown: Markdown = False,
 ) -> None:
-    """Stem diameters and volumes with their intervals, of trees that one to three scanners see.
+    """Stem diameters and volumes of trees that one to three scanners see.
 
     On the seeds from 0 the numbers were chosen, those from 100 show what they are worth.
     """
@@ -92,7 +92,7 @@ def stems(
 @app.command()
 def models(
     paths: Annotated[list[Path], typer.Argument(metavar="CLOUD MODEL...", exists=True, dir_okay=False)],
-    unit: Annotated[str, typer.Option("--unit", help="Of the clouds: m, cm, mm; models are in metres.")] = "m",
+    unit: Annotated[float, typer.Option("--unit", help="Of the clouds, in metres, as models are.")] = 1,
     output: Output = None,
     markdown: Markdown = False,
 ) -> None:

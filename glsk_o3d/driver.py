@@ -15,7 +15,7 @@ from .interop.packages import import_open3d
 from .lpr_reducer import LPRReducer
 from .parameters import check_number
 from .pipeline import Filter, OnIteration, OnState, Pipeline
-from .recipes import RECIPE_ENDINGS, load_recipe
+from .recipes import RECIPE_ENDING, load_recipe
 from .recipes.catalogue import named_pipeline
 from .ring_builder import RingBuilder
 from .skeleton import Skeleton
@@ -39,7 +39,7 @@ def skeletonize(
     cloud : open3d.geometry.PointCloud, open3d.t.geometry.PointCloud, TriangleMesh of either kind, or (N, 3) array
         Points, or the vertices of a mesh. They need no order, normals or orientation, and are not modified.
     pipeline : Pipeline, {"default", "wen2024", "cao2010"}, name of a plugin's pipeline, or path of a recipe
-        A name that ends in ``.json`` or ``.toml`` is a path. A mapping is options for ``"default"``.
+        A name that ends in ``.json`` is a path. A mapping is options for ``"default"``.
     on_iteration : callable, optional
         Called with the IterationRecord of each solve; return False to stop the contraction there.
     on_state : callable, optional
@@ -85,7 +85,7 @@ def as_pipeline(pipeline: Pipeline[Skeleton] | Filter[Skeleton] | str | os.PathL
 
     InvalidParameterError and RecipeError as of `skeletonize`.
     """
-    if isinstance(pipeline, os.PathLike) or (isinstance(pipeline, str) and pipeline.lower().endswith(RECIPE_ENDINGS)):
+    if isinstance(pipeline, os.PathLike) or (isinstance(pipeline, str) and pipeline.lower().endswith(RECIPE_ENDING)):
         pipeline = load_recipe(pipeline)
     elif isinstance(pipeline, str):
         pipeline = named_pipeline(pipeline)

@@ -76,7 +76,7 @@ def prepared(tmp_path_factory):
     skeleton = glsk.skeletonize(cloud)
     for name in ("skeleton.ply", "skeleton.json", "s.json", "horse.json"):
         save_skeleton(skeleton, folder / name)
-    glsk.save_recipe(glsk.pipelines.default(), folder / "plant.toml")
+    glsk.save_recipe(glsk.pipelines.default(), folder / "plant.json")
     (folder / "mine.mlx").write_text((ROOT / "filters" / "glskeleton.mlx").read_text())
     return folder
 

@@ -33,8 +33,8 @@ o3d.visualization.draw_geometries([cloud, skeleton.to_line_set(), glsk.to_tubes(
 print(skeleton.vertices.shape, skeleton.report.iterations[-1].explained, skeleton.to_networkx().nodes)
 table = glsk.analysis.branch_table(skeleton, root=0)
 print(table.length, glsk.analysis.segment(skeleton).shape, glsk.Report.from_dict({}).to_dict()["n_input"])
-glsk.save_recipe(whole, "plant.toml")
-again: Skeleton = glsk.load_recipe("plant.toml")(cloud)
+glsk.save_recipe(whole, "plant.json")
+again: Skeleton = glsk.load_recipe("plant.json")(cloud)
 
 RingBuilder(k="twelve")  # wrong
 RingBuilder(ks=12)  # wrong

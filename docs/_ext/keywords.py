@@ -18,7 +18,7 @@ KEYWORDS = {
     "docs/meshlab": "meshlab, pymeshlab, mlx, filter script, filter scripts",
     "docs/batch": "batch, parallel, dask, cluster, tiles, ledger, many clouds, many scans",
     "docs/viewing": "view, viewer, plot, preview, notebook, picture, html, window, visualization, visualisation",
-    "docs/recipes": "recipe, recipes, reproducible, repeat, toml, pipeline",
+    "docs/recipes": "recipe, recipes, reproducible, repeat, json, pipeline",
     "docs/formats": "format, formats, file, files, save, read, load, export, las, laz, e57, ply, swc, gltf, csv, units",
     "docs/plugins": "plugin, plugins, entry points, own filter, extend, custom filter",
     "docs/accuracy": "accuracy, accurate, error, benchmark of accuracy",

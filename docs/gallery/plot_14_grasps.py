@@ -82,9 +82,9 @@ print(skeleton, *skeleton.report.warnings, sep="\n")
 # the table, which is solid behind its plane. Whatever the fingers or the palm would sweep over on the way in counts.
 
 gripper = Gripper(max_opening=0.08)
-options = dict(cone=((0, 0, -1), 95), around=12, spacing=0.006, clearance=0.006)
+options = dict(around=12, spacing=0.006, clearance=0.006)
 blind = grasp_candidates(skeleton, gripper, cloud=(), **options)
-safe = grasp_candidates(skeleton, gripper, obstacles=[plane], **options)
+safe = grasp_candidates(skeleton, gripper, plane=plane, **options)
 print(f"{len(blind)} by the skeleton alone, {len(safe)} that touch nothing else")
 print(*safe.left_out.items(), sep="\n")
 
@@ -104,7 +104,7 @@ plt.show()
 
 # %%
 # Left, the best 15 by the skeleton alone; right, of those that touch nothing else: forks from palm to fingertips. For a
-# robot they are poses in JSON. ``glsk grasps mug.json --opening 0.08 --plane 0,0,1,0 --cone -z,95`` writes them, too.
+# robot they are poses in JSON. ``glsk grasps mug.json --opening 0.08 --plane 0,0,1,0`` writes them, too.
 
 with TemporaryDirectory() as folder:
     safe[:20].to_json(Path(folder, "grasps.json"))

@@ -57,7 +57,7 @@ print(tree)
 # %%
 # Volume and stem diameter, against what this tree was made with.
 
-measures = glsk.analysis.tree_measures(tree, unit="m")
+measures = glsk.analysis.tree_measures(tree)
 truth = trees[0]
 ends, radii = truth.nodes[truth.edges], truth.radii[truth.edges]
 pieces = (

@@ -1,6 +1,6 @@
 """How a skeleton lies in its cloud, without knowing the truth."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,7 +27,7 @@ FAR_FROM_SECTION = 3.0
 MIN_ARC_VARIANCE = 0.1
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Assessment:
     """How well a skeleton fits its cloud: three measures without units, from 0 to 1. 1 is best.
 
@@ -51,9 +51,6 @@ class Assessment:
     loops, wide_loops : int
         Loops of a minimum cycle basis of the skeleton; those that open wider than their tube: the largest circle inside
         has a larger radius than the median of the nearest cross-sections.
-    edge_centredness : (E,) float array
-        max(0, 1 - d / r) of the cross-section nearest to the middle of each edge, NaN in the empty ball of a junction.
-        Not part of `as_dict`.
     """
 
     centredness: float
@@ -63,11 +60,6 @@ class Assessment:
     clusters: int
     loops: int
     wide_loops: int
-    edge_centredness: np.ndarray = field(repr=False)
-
-    def as_dict(self) -> dict[str, Any]:
-        """The numbers, as JSON holds them."""
-        return {name: value for name, value in vars(self).items() if name != "edge_centredness"}
 
 
 def assess(skeleton: Skeleton, points: Any) -> Assessment:
@@ -103,7 +95,6 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
     """
     cloud = cloud_points(points)
     cloud = np.unique(cloud[np.isfinite(cloud).all(axis=1)], axis=0)
-    middles = skeleton.vertices[skeleton.edges].mean(axis=1)
     if not skeleton.length > 0:
         raise InvalidParameterError("the skeleton has no edge with a length: there is no curve to assess")
     if len(cloud) > 1:
@@ -122,8 +113,7 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
     offsets, radii = sections.offsets[found], sections.radii[found]
     centred = 1 - np.divide(offsets, radii, out=np.sign(offsets), where=offsets < radii)
     bounded = found & (sections.open_angles < OPEN_ANGLE)
-    nearest = cKDTree(sections.places[found])
-    radius = radii[nearest.query(skeleton.vertices)[1]]
+    radius = radii[cKDTree(sections.places[found]).query(skeleton.vertices)[1]]
     cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
     wide = sum(inscribed_circle(skeleton.vertices[cycle])[1] > np.median(radius[cycle]) for cycle in cycles)
     components = skeleton.n_components
@@ -136,7 +126,6 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
         clusters=clusters,
         loops=len(cycles),
         wide_loops=int(wide),
-        edge_centredness=np.where(_at_junctions(skeleton, middles, cloud), np.nan, centred[nearest.query(middles)[1]]),
     )
 
 

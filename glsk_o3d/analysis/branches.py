@@ -11,7 +11,6 @@ from ..numerics.cycles import minimum_cycle_basis
 from ..numerics.polylines import arc_lengths, place_at
 from ..numerics.vectors import norm
 from ..refinement.rooted import root_among
-from ..report import html_table
 from ..skeleton import Skeleton
 from .rows import Rows
 from .segmentation import branch_of_point
@@ -103,11 +102,6 @@ class BranchTable(Rows, row="branch"):
         widths = [max(map(len, column)) for column in columns]
         lines = ("  ".join(map(str.rjust, row, widths)) for row in zip(*columns, strict=True))
         return "\n".join([repr(self), *lines])
-
-    def _repr_html_(self):
-        columns = self.printed()
-        rows = zip(*columns.values(), strict=True)
-        return f"<p>{self!r}</p>{html_table(rows, [head.replace('_', ' ') for head in columns], 'right')}"
 
 
 @np.errstate(all="ignore")  # a file may hold coordinates whose squares no float64 holds

@@ -1,4 +1,4 @@
-"""A circle through points of which some do not lie on it, and how well they determine its radius."""
+"""A circle through points of which some do not lie on it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import t as student
 
 from ..numerics.vectors import TINY
 
@@ -14,7 +13,6 @@ TRIPLES = 500  # derived: with half of the points astray 99.9 % of the draws hav
 SCORED = 1000  # speed: points that judge the triples
 OUTLYING = 3.0  # published: standard deviations beyond which residuals do not count
 ROUND = 0.02  # fitted: standard deviation over the radius, at least, by which residuals are judged: bark, oval stems
-SECTOR = 10.0  # fitted: degrees in which residuals are alike, as those of ridges and flat sides
 SEEN_GAP = 20.0, 6.0  # fitted: a gap between points is seen, too, up to so many degrees, or of the median gaps
 FEW = 0.1  # fitted: of the points, on a side apart from others, where they may be undergrowth
 PASSES = 20  # derived: the points that count have settled after a few
@@ -23,12 +21,9 @@ PASSES = 20  # derived: the points that count have settled after a few
 class CircleFit(NamedTuple):
     """A circle, in the units of its points."""
 
-    centre: np.ndarray  # (2,)
     radius: float
-    interval: tuple[float, float]  # in which the radius is with 95 % confidence; may reach to infinity
     arc: float  # degrees in which points are
-    rms: float  # of the distances of the points that count
-    points: int  # of these, how many
+    points: int  # how many count
 
 
 def fit_circle(points: np.ndarray) -> CircleFit | None:
@@ -39,10 +34,6 @@ def fit_circle(points: np.ndarray) -> CircleFit | None:
     (Levenberg-Marquardt) over the points no farther than three standard deviations, until these stay the same. A few
     points on another side do not count, where they would weigh most.
 
-    The interval is one of the curvature, 1 / radius, which is what a short arc shows: its errors are even, while those
-    of the radius are not. The variance is the larger one of two: residuals are independent, or they are alike within
-    sectors (Liang and Zeger 1986), as on bark and on stems that are not round.
-
     Returns
     -------
     CircleFit or None
@@ -50,8 +41,7 @@ def fit_circle(points: np.ndarray) -> CircleFit | None:
     """
     if len(points) < 4:
         return None
-    rng, origin = np.random.default_rng(0), np.median(points, axis=0)
-    p = points - origin
+    rng, p = np.random.default_rng(0), points - np.median(points, axis=0)
     corners = p[rng.integers(len(p), size=(TRIPLES, 3))]
     sides = corners[:, 1:] - corners[:, :1]
     usable = np.abs(np.linalg.det(sides)) > 1e-9 * (sides**2).sum(axis=(1, 2))
@@ -80,7 +70,8 @@ def fit_circle(points: np.ndarray) -> CircleFit | None:
         if (on == before).all():
             break
         circle = least_squares(_residuals, circle, _jacobian, method="lm", args=(p[on],)).x
-    return _judged(circle, p[on], origin)
+    _, gaps, seen = _around(circle, p[on])
+    return CircleFit(abs(float(circle[2])), float(gaps[seen].sum()), int(on.sum()))
 
 
 def _residuals(circle: np.ndarray, p: np.ndarray) -> np.ndarray:
@@ -98,28 +89,3 @@ def _around(circle: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray, 
     order = np.argsort(angle)
     gaps = np.diff(angle[order], append=angle.min() + 360)
     return order, gaps, gaps <= max(SEEN_GAP[0], SEEN_GAP[1] * float(np.median(gaps)))
-
-
-def _judged(circle: np.ndarray, p: np.ndarray, origin: np.ndarray) -> CircleFit:
-    """What the points on a circle say of it."""
-    residual, rows = _residuals(circle, p), _jacobian(circle, p)
-    spread = np.linalg.pinv(rows.T @ rows)
-    angle = np.degrees(np.arctan2(*(p - circle[:2]).T))
-    _, sector = np.unique(np.floor(angle / SECTOR), return_inverse=True)
-    sectors = sector.max() + 1
-    sums = np.stack([np.bincount(sector, column * residual) for column in rows.T], axis=1)
-    alike = spread @ sums.T @ sums @ spread * sectors / max(sectors - 1, 1)
-    independent = spread * (residual @ residual) / (len(p) - 3)
-    variances = np.array([independent[2, 2], alike[2, 2]])
-    reach = (student.ppf(0.975, [len(p) - 3, max(sectors - 3, 1)]) * np.sqrt(variances)).max()
-    radius = abs(float(circle[2]))
-    share = reach / radius  # of the curvature
-    _, gaps, seen = _around(circle, p)
-    return CircleFit(
-        circle[:2] + origin,
-        radius,
-        (radius / (1 + share), radius / (1 - share) if share < 1 else np.inf),
-        float(gaps[seen].sum()),
-        float(np.sqrt((residual**2).mean())),
-        len(p),
-    )

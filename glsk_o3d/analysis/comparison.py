@@ -1,6 +1,6 @@
 """A known axis, and how far a skeleton is from it."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -58,7 +58,7 @@ class Truth:
             object.__setattr__(self, name, array)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Comparison:
     """How far a skeleton is from a known axis.
 
@@ -85,8 +85,6 @@ class Comparison:
         Their number in the skeleton minus that in the axis.
     topology, perfect : bool
         Whether components and loops agree; and also all leaves are matched: `tips_f1` is 1.
-    edge_error : (E,) float array
-        `error` of each edge of the skeleton. Not part of `as_dict`.
     """
 
     error: float
@@ -103,11 +101,6 @@ class Comparison:
     junctions: int
     topology: bool
     perfect: bool
-    edge_error: np.ndarray = field(repr=False)
-
-    def as_dict(self) -> dict[str, Any]:
-        """The numbers, as JSON holds them."""
-        return {name: value for name, value in vars(self).items() if name != "edge_error"}
 
 
 def compare(skeleton: Skeleton, truth: Any) -> Comparison:
@@ -144,7 +137,7 @@ def compare(skeleton: Skeleton, truth: Any) -> Comparison:
         raise InvalidParameterError("the skeleton is empty: there is nothing to compare")
     step = PLACE_SPACING * np.median(truth.radii)
     _, axis_places, axis_radius = places_along(axis, step)
-    edge, curve_places, curve_radius = places_along(skeleton, step)
+    _, curve_places, curve_radius = places_along(skeleton, step)
     to_axis, nearest = cKDTree(axis_places).query(curve_places)
     to_curve, _ = cKDTree(curve_places).query(axis_places)
     radius = axis_radius[nearest]
@@ -175,7 +168,6 @@ def compare(skeleton: Skeleton, truth: Any) -> Comparison:
         **difference,
         topology=topology,
         perfect=topology and tips_f1 == 1,
-        edge_error=np.bincount(edge, error) / np.bincount(edge) if len(skeleton.edges) else np.empty(0),
     )
 
 

@@ -12,9 +12,10 @@ from ..errors import InvalidParameterError, SkeletonWarning
 from ..numerics.neighbourhoods import plane_axes
 from ..numerics.vectors import AXES, TINY, along_axis, norm
 from ..numerics.vectors import unit as directions
+from ..parameters import check_number
 from ..skeleton import Skeleton
 from .circles import CircleFit, fit_circle
-from .trees import OUTSIDE, Cylinders, cylinders, metres
+from .trees import OUTSIDE, Cylinders, cylinders
 
 BREAST_HEIGHT = 1.3  # published: metres above the ground at which foresters measure stems
 TALLEST_TREE = 116.07  # published: metres, Hyperion, the tallest tree known, as measured in 2019
@@ -24,9 +25,7 @@ FEWEST_ON_CIRCLE = 12  # fitted: on a circle, of which fewer may be anything
 LEAST_ARC = 60.0  # derived: degrees of a circle; a chord of less leaves the surface by an eighth of the radius
 FORM_FACTOR = 2.0  # derived: wood over a cylinder as thick as at 1.3 m and as high as the tree; branches as thick as
 # the trunk together (Leonardo) that reach to the top fill one, and their ways and the foot are not twice that
-FOOT_SLACK = 0.003  # derived: of the diameter; the foot may be 3 cm off, and stems taper by up to a tenth in a metre
-VOLUME_SLACK = 0.08  # measured: of the volume, in 95 % of scans; benchmarks/trees.py stems
-UNKNOWN = CircleFit(np.zeros(2), np.nan, (np.nan, np.nan), np.nan, np.nan, 0)
+UNKNOWN = CircleFit(np.nan, np.nan, 0)
 
 
 @dataclass(frozen=True)
@@ -37,22 +36,17 @@ class TreeMeasures:
     ----------
     height : float
         Of the highest point above the foot of the stem, without points farther than three radii from the curve.
-    stem_diameter, stem_interval : float, (low, high)
-        Of the circle through the points of the stem in a slice of 10 cm across it, 1.3 m above the foot; the 95 %
-        confidence interval, if the stem is round. NaN without such a circle.
-    stem_arc, stem_rms, stem_points : float, float, int
-        Degrees of that circle with points; root mean square distance of these points, and their number.
+    stem_diameter, stem_arc : float
+        Of the circle through the points of the stem in a slice of 10 cm across it, 1.3 m above the foot; degrees of it
+        with points. NaN without such a circle.
     crown_base : float
         Height at which the lowest branch leaves the stem; NaN without one.
     length, volume : tuple of float
         Length of the axes and volume of each order, the stem first; see `Cylinders`. The volume is that of parts with a
         surface: confidence above 0, or unknown.
-    volume_interval : (low, high)
-        Interval of the whole volume, with 8 % on either side as on scanned trees. Traced parts are between nothing and
-        as thick as the parts that they grow from.
-    traced, traced_volume : float
-        Share of the length with confidence 0 (twigs without a surface, leaves, noisy parts), and its volume. NaN if
-        confidences are unknown.
+    traced : float
+        Share of the length with confidence 0: twigs without a surface, leaves, noisy parts. NaN if confidences are
+        unknown.
     root, up, unit : (x, y, z), str, float
         The foot of the stem in the cloud's units, the axis that points up, and the metres of one unit.
     doubts : tuple of str
@@ -61,23 +55,18 @@ class TreeMeasures:
 
     height: float
     stem_diameter: float
-    stem_interval: tuple[float, float]
     stem_arc: float
-    stem_rms: float
-    stem_points: int
     crown_base: float
     length: tuple[float, ...]
     volume: tuple[float, ...]
-    volume_interval: tuple[float, float]
     traced: float
-    traced_volume: float
     root: tuple[float, float, float]
     up: str
     unit: float
     doubts: tuple[str, ...]
 
 
-def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, unit: float | str = 1.0) -> TreeMeasures:
+def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, unit: float = 1.0) -> TreeMeasures:
     """Measure a tree as foresters do.
 
     Parameters
@@ -88,8 +77,8 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
         See `cylinders`.
     up : {"x", "y", "z", "-x", "-y", "-z"}, optional
         Axis that points up. By default that of `root` here or in the pipeline `tree`, or else ``"z"``.
-    unit : float or {"m", "cm", "mm", "in", "ft"}
-        One unit of the cloud, in metres or by its name.
+    unit : float
+        One unit of the cloud, in metres: 0.001 for millimetres.
 
     Returns
     -------
@@ -98,7 +87,7 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
     Raises
     ------
     InvalidParameterError
-        See `cylinders`; or `up` is no axis, or `unit` is neither positive nor one of these.
+        See `cylinders`; or `up` is no axis, or `unit` is not positive.
 
     Warns
     -----
@@ -119,7 +108,7 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
     up = next(axis for axis in grown if isinstance(axis, str) and axis in AXES) if up is None else up
     if up not in AXES:
         raise InvalidParameterError(f"up = {up!r}: must be 'x', 'y' or 'z', with a minus where that points down")
-    unit = metres(unit)
+    check_number("unit", unit, low=0, open_low=True)
     pieces = cylinders(skeleton, root)
     ground = pieces.start_point[0]
 
@@ -132,20 +121,21 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
     near = _points_near(skeleton)
     highest = float(max(high, height(skeleton.points[near]).max(initial=high)))
     leaving = bottom[(pieces.order == 1) & stem[pieces.parent]]
-    sums = _sums_by_order(pieces, unit)
+    traced = pieces.confidence == 0  # unknown is not
+    length, volume = unit * pieces.length, unit**3 * np.where(traced, 0, pieces.volume)
+    known = 1.0 if np.isfinite(pieces.confidence).all() else np.nan
     section, unknown = _stem_section(skeleton, pieces, bottom, top, near, unit)
-    doubts = _find_doubts(-low / max(high - low, TINY), highest, section, unknown, sum(sums["volume"]), up, unit)
+    doubts = _find_doubts(-low / max(high - low, TINY), highest, section, unknown, float(volume.sum()), up, unit)
     for doubt in doubts:
         warnings.warn(doubt, SkeletonWarning, stacklevel=2)
     return TreeMeasures(
         height=highest,
         stem_diameter=2 * section.radius,
-        stem_interval=(2 * section.interval[0], 2 * section.interval[1]),
         stem_arc=section.arc,
-        stem_rms=section.rms,
-        stem_points=section.points,
         crown_base=float(leaving.min()) if len(leaving) else np.nan,
-        **sums,
+        length=tuple(np.bincount(pieces.order, length).tolist()),
+        volume=tuple(np.bincount(pieces.order, volume).tolist()),
+        traced=known * float(pieces.length[traced].sum() / max(pieces.length.sum(), TINY)),
         root=tuple(ground.tolist()),
         up=up,
         unit=unit,
@@ -180,9 +170,7 @@ def _stem_section(
         return UNKNOWN, few if len(skeleton.points) else "the skeleton has no points: .json and .npz files keep them"
     if fit.arc < LEAST_ARC:
         return UNKNOWN, f"points show {fit.arc:.0f} degrees of it, and at least {LEAST_ARC:.0f} are needed"
-    low, high = (abs(end - fit.radius) for end in fit.interval)
-    slack = FOOT_SLACK * fit.radius
-    return fit._replace(interval=(fit.radius - np.hypot(low, slack), fit.radius + np.hypot(high, slack))), ""
+    return fit, ""
 
 
 def _find_doubts(
@@ -195,7 +183,7 @@ def _find_doubts(
     if highest > TALLEST_TREE:
         doubts.append(
             f"the tree is {highest:.4g} m high, and none is known above {TALLEST_TREE:.0f} m: is a unit of the cloud "
-            f"{unit:g} m? name it: unit='mm', --unit mm"
+            f"{unit:g} m? give its metres, such as 0.001"
         )
     if unknown and highest > BREAST_HEIGHT:
         doubts.append(f"the diameter of the stem at {BREAST_HEIGHT} m is not known: {unknown}")
@@ -218,25 +206,3 @@ def _points_near(skeleton: Skeleton) -> np.ndarray:
     some = np.flatnonzero(owner >= 0)
     away = norm(skeleton.points[some] - skeleton.vertices[owner[some]])
     return some[away <= (OUTSIDE * skeleton.radii + longest)[owner[some]]]
-
-
-def _sums_by_order(pieces: Cylinders, unit: float) -> dict[str, Any]:
-    """The fields of `TreeMeasures` that are sums over cylinders."""
-
-    def by_order(values: np.ndarray, power: int) -> tuple[float, ...]:
-        return tuple((unit**power * np.bincount(pieces.order, values)).tolist())
-
-    traced = pieces.confidence == 0  # unknown is not
-    volume = by_order(np.where(traced, 0, pieces.volume), 3)
-    most = pieces.radius.copy()
-    for row in np.flatnonzero(traced & (pieces.parent >= 0)).tolist():  # parents come first
-        most[row] = max(most[row], most[pieces.parent[row]])
-    added = unit**3 * np.pi * float((most**2 * pieces.length)[traced].sum())
-    known = 1.0 if np.isfinite(pieces.confidence).all() else np.nan
-    return dict(
-        length=by_order(pieces.length, 1),
-        volume=volume,
-        volume_interval=((1 - VOLUME_SLACK) * sum(volume), (1 + VOLUME_SLACK) * (sum(volume) + added)),
-        traced=known * float(pieces.length[traced].sum() / max(pieces.length.sum(), TINY)),
-        traced_volume=known * unit**3 * float(pieces.volume[traced].sum()),
-    )

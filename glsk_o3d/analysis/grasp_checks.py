@@ -6,7 +6,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import InvalidParameterError
-from ..interop.clouds import cloud_points, open3d_class
 from ..numerics.vectors import norm
 from .gripper import Gripper
 
@@ -15,7 +14,6 @@ CELL_NEIGHBOURS = 8  # measured: of 1230 ways through sparse walls 11 seemed fre
 CLOSE_POINTS = 0.5
 WIDER = (1, 2, 3)  # measured: clearances to try; in noise of 0.5 % of the diagonal the first alone leaves few grasps
 AT_THE_SIDE = np.sqrt(3) / 2  # derived: where a side begins, over the radius: the cosine of 30 degrees
-NOTHING_BETWEEN = "ways in with nothing between the jaws"
 
 
 class Ways(NamedTuple):
@@ -29,9 +27,8 @@ class Ways(NamedTuple):
 
 def free_ways(
     ways: Ways,
-    wanted: np.ndarray,
     points: np.ndarray,
-    obstacles: list[np.ndarray],
+    plane: np.ndarray | None,
     middle: np.ndarray,
     gripper: Gripper,
     width: np.ndarray,
@@ -39,51 +36,39 @@ def free_ways(
 ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray]:
     """What keeps the gripper from coming in, open a little wider than the `width` of the part, (P,), or wider still.
 
-    `wanted`, (P, A) bool array, are the ways to look at, `points` those of the object, if anybody is to look at them,
-    and `obstacles` as `obstacle_list` gives them. Where the object is says `middle`, (m, 3): on this side of planes,
-    and the gripper comes from its diagonal away.
+    `points` are those of the object, if anybody is to look at them. Where the object is says `middle`, (m, 3): on this
+    side of the plane, (4,), and the gripper comes from its diagonal away.
 
     The reasons, (P, A) bool arrays, are those at the least opening, for ways that are free at none. Three (P, A) arrays
     follow: the least opening at which the way is free, the depth of the fingertips past the axis, and the number of
     sides of the part that have points, as in `GraspCandidates`.
     """
     far = float(np.linalg.norm(np.ptp(middle, axis=0)))
-    close = CLOSE_POINTS * min(gripper.finger[:2])
-    scene = [("the object", cells(points, close))] if len(points) else []
-    scene += [("an obstacle", each if each.ndim == 1 else cells(each, close)) for each in obstacles]
+    surface = cells(points, CLOSE_POINTS * min(gripper.finger[:2]))
     depth = np.minimum(gripper.reach, width / 2)
-    reasons: dict[str, np.ndarray] = {}
-    opening, seen, free = np.full(wanted.shape, np.nan), np.zeros(wanted.shape, int), np.zeros(wanted.shape, bool)
+    shape = ways.approach.shape[:2]
+    reasons: dict[str, Any] = {}
+    opening, seen, free = np.full(shape, np.nan), np.zeros(shape, int), np.zeros(shape, bool)
     for times in WIDER:
         wide = np.minimum(width + times * clearance, gripper.max_opening)
         low, high = swept(gripper, wide, depth, clearance, far)
-        asked, found = wanted & ~free, {}
-        for what, surface in scene:
-            for name, part in _met(ways, surface, middle, low, high, asked, what).items():
-                found[name] = found.get(name, False) | part
-                asked &= ~part
-            if what == "the object":
-                beside = hits(ways, surface, *sides(gripper, wide, depth, width), asked)
-                seen = np.where(asked, beside.sum(axis=2), seen)
-                found[NOTHING_BETWEEN] = asked & ~beside[..., :2].any(axis=2)
-                asked &= ~found[NOTHING_BETWEEN]
+        asked, found = ~free, dict[str, Any]()
+        if len(points):
+            touched = hits(ways, surface, low, high, asked).any(axis=2)
+            asked &= ~touched
+            beside = hits(ways, surface, *sides(gripper, wide, depth, width), asked)
+            seen = np.where(asked, beside.sum(axis=2), seen)
+            empty = asked & ~beside[..., :2].any(axis=2)
+            asked &= ~empty
+            found |= {"ways in that touch points": touched, "ways in with nothing between the jaws": empty}
+        behind = asked & (plane is not None and hits_plane(ways, plane, middle, low, high).any(axis=2))
+        asked &= ~behind
+        found["ways in behind the plane"] = behind
         opening = np.where(asked, wide[:, None], opening)
         free |= asked
         reasons = reasons or found
     met = {name: part & ~free for name, part in reasons.items()}
-    return met, opening, np.broadcast_to(depth[:, None], wanted.shape), seen
-
-
-def _met(ways, obstacle, middle, low, high, asked, what) -> dict[str, np.ndarray]:
-    """Where a finger meets something, and where no finger does, but the palm: (P, A) bool arrays by reason."""
-    if obstacle.ndim == 1:
-        behind = hits_plane(ways, obstacle, middle, low, high)
-        fingers, palm = behind[..., :2], behind[..., 2]
-    else:
-        fingers = hits(ways, obstacle, low[:, :2], high[:, :2], asked)
-        palm = hits(ways, obstacle, low[:, 2:], high[:, 2:], asked & ~fingers.any(axis=2))[..., 0]
-    finger = fingers[..., 0] | fingers[..., 1]
-    return {f"ways in with a finger in {what}": finger, f"ways in with the palm in {what}": palm}
+    return met, opening, np.broadcast_to(depth[:, None], shape), seen
 
 
 def swept(
@@ -173,19 +158,13 @@ def hits_plane(ways: Ways, plane: np.ndarray, middle: np.ndarray, low: np.ndarra
     return (ways.position @ normal + shift)[:, None, None] + (lowest * slope).sum(axis=3) < 0
 
 
-def obstacle_list(given: Any) -> list[np.ndarray]:
-    """Obstacles as arrays: (4,) for a plane, (n, 3) for a cloud. InvalidParameterError for a plane without a normal."""
-    if not isinstance(given, list | tuple):
-        raise InvalidParameterError("obstacles must be a list of clouds and planes, also where there is but one")
-    found = []
-    for each in given:
-        if open3d_class(each)[0] or np.ndim(each) > 1 or isinstance(each, str):
-            found.append(cloud_points(each))
-            continue
-        plane = np.ravel(np.asarray(each, float))
-        if len(plane) != 4 or not (np.isfinite(plane).all() and plane[:3].any()):
-            raise InvalidParameterError(
-                f"{each} is no plane: give finite a, b, c, d of ax + by + cz + d = 0, a, b, c not all 0, in a list"
-            )
-        found.append(plane)
+def checked_plane(plane: Any) -> np.ndarray:
+    """The plane as a (4,) float array; InvalidParameterError if it is none."""
+    try:
+        found = np.asarray(plane, float).reshape(4)
+    except (TypeError, ValueError):
+        found = np.zeros(4)
+    if not (np.isfinite(found).all() and found[:3].any()):
+        must = "must be finite a, b, c, d of ax + by + cz + d = 0, a, b, c not all 0"
+        raise InvalidParameterError(f"plane = {plane!r}: {must}")
     return found

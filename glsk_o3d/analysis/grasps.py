@@ -1,6 +1,5 @@
 """Where a gripper with parallel jaws can take an object: candidates along its skeleton, with a free way in."""
 
-import math
 import warnings
 from collections import Counter
 from typing import Any
@@ -15,7 +14,7 @@ from ..parameters import check_number
 from ..report import outside
 from ..skeleton import Skeleton
 from .curves import check_places
-from .grasp_checks import Ways, free_ways, obstacle_list
+from .grasp_checks import Ways, checked_plane, free_ways
 from .gripper import GraspCandidates, Gripper, listed
 
 UNLIKELY_OPENING = 20.0  # derived: openings over diagonals: above those of hands and screws, below those of mm and m
@@ -26,8 +25,7 @@ def grasp_candidates(
     gripper: Gripper | float,
     *,
     cloud: Any = None,
-    obstacles: Any = (),
-    cone: tuple[Any, float] | None = None,
+    plane: Any = None,
     clearance: float | None = None,
     around: int = 8,
     spacing: float | None = None,
@@ -37,10 +35,10 @@ def grasp_candidates(
 
     The jaws close across a branch, at places along its curve and from directions around it. The open gripper approaches
     in a straight line, from as far away as the diagonal of the object, until its fingertips are past the axis by its
-    reach, but not past the part. Approaches are left out if a finger or the palm would touch points of the object or an
-    obstacle, or if no points are between the jaws. Unseen space counts as free. The quality ranks candidates; it does
-    not measure force closure. Its formula, each step, and the sources (Vahrenkamp et al. 2018; ten Pas et al. 2017):
-    docs/grasping.md.
+    reach, but not past the part. Approaches are left out if a finger or the palm would touch points or reach behind a
+    table's plane, or if no points are between the jaws. Unseen space counts as free. The quality ranks candidates; it
+    does not measure force closure. Its formula, each step, and the sources (Vahrenkamp et al. 2018; ten Pas et al.
+    2017): docs/grasping.md.
 
     Parameters
     ----------
@@ -49,18 +47,15 @@ def grasp_candidates(
     gripper : Gripper or float
         Or its widest opening [cloud's units], with the other sizes in proportion.
     cloud : cloud, optional
-        All points of the object; by default the skeleton's. With an empty tuple a finger may go through the object.
-    obstacles : list of clouds and (4,) array_like, optional
-        Clouds of other objects, or the vertices of meshes; they may include points of the object. Four numbers are a
-        plane as from Open3D's ``segment_plane``, solid behind it as seen from the object.
-    cone : (direction, degrees), optional
-        Largest angle of an approach to this (3,) direction.
+        All points that the gripper must not touch, also of other objects; by default the skeleton's. With an empty
+        tuple a finger may go through the object.
+    plane : (4,) array_like, optional
+        A table, as from Open3D's ``segment_plane``: solid behind it as seen from the points.
     clearance : float, optional
         Opening beyond the width w [cloud's units], half on either side; twice or three times as much where less is not
         free, as in noise. Half of it is also kept all around the gripper. By default a tenth of the widest opening.
     around : int
-        Approach directions at each place, evenly around the axis; the first is as near as possible to the direction of
-        the cone, or else to -z.
+        Approach directions at each place, evenly around the axis; the first is as near as possible to -z.
     spacing : float, optional
         Distance of the places along the curve [cloud's units]; by default the median radius of the branch. They keep
         a radius away from the ends of the branch.
@@ -78,7 +73,7 @@ def grasp_candidates(
     InvalidParameterError
         The skeleton is empty or lacks radii, confidence or points; or a parameter is out of range.
     InvalidCloudError
-        An obstacle or the object is no cloud.
+        `cloud` is none.
 
     Warns
     -----
@@ -91,14 +86,14 @@ def grasp_candidates(
     >>> from glsk_o3d.samples import tube
     >>> straight = tube(length=1.0, radius=0.1)
     >>> axis = Skeleton(straight.nodes, straight.edges, straight.radii, (), (), (), confidence=[1, 1])
-    >>> table = [(0, 0, 1, 0.1)]  # z = -0.1: the tube lies on it, and cannot be taken from below, nor from the side
-    >>> grasp_candidates(axis, 0.4, cloud=straight.points, obstacles=table, clearance=0.05, around=4)
-    GraspCandidates(9 at 9 places; not taken: 27 ways in with a finger in an obstacle)
+    >>> table = (0, 0, 1, 0.1)  # z = -0.1: the tube lies on it, and cannot be taken from below, nor from the side
+    >>> grasp_candidates(axis, 0.4, cloud=straight.points, plane=table, clearance=0.05, around=4)
+    GraspCandidates(9 at 9 places; not taken: 27 ways in behind the plane)
     """
     gripper = gripper if isinstance(gripper, Gripper) else Gripper(gripper)
     clearance = gripper.max_opening / 10 if clearance is None else clearance
     _check(skeleton, clearance, around, spacing, min_confidence)
-    direction, least = (np.array([0.0, 0, -1]), -np.inf) if cone is None else checked_cone(cone)
+    plane = None if plane is None else checked_plane(plane)
     points = _object(skeleton, cloud)
     middle = points if len(points) else skeleton.vertices
     if gripper.max_opening > UNLIKELY_OPENING * np.linalg.norm(np.ptp(middle, axis=0)):
@@ -106,13 +101,10 @@ def grasp_candidates(
         warnings.warn(f"the gripper opens {many}: are the units the same?", SkeletonWarning, stacklevel=outside())
     place, branch, width, quality, left_out, looked_at = _fitting(skeleton, gripper, clearance, spacing, min_confidence)
     position, axis = place[:, :3], place[:, 3:6]
-    approach = _directions_around(axis, -direction, around)
+    approach = _directions_around(axis, around)
     ways = Ways(position, axis, approach, np.cross(axis[:, None], approach))
-    wanted = approach @ direction >= least
-    blocked, opening, depth, seen = free_ways(
-        ways, wanted, points, obstacle_list(obstacles), middle, gripper, width, clearance
-    )
-    free, ways_left_out = _sorted_out({"ways in outside the cone": ~wanted, **blocked})
+    blocked, opening, depth, seen = free_ways(ways, points, plane, middle, gripper, width, clearance)
+    free, ways_left_out = _sorted_out(blocked)
     quality = quality[free // around] * (seen.ravel()[free] / 3 if len(points) else 1)
     order = _in_rounds(free // around, quality.round(9))  # equal ones differ in their last digits
     free, quality = free[order], quality[order]
@@ -212,13 +204,11 @@ def _places_on(skeleton, path, spacing):
     return np.column_stack([here[:, :3], axis, here[:, 3], slope, here[:, 4]])[size[:, 0] > 0]
 
 
-def _directions_around(axis, up, n):
+def _directions_around(axis, n):
     """Directions perpendicular to each axis, (P, n, 3), evenly around it; the first points down as far as it can."""
-    side = np.eye(3)[np.argmin(np.abs(up))]
-    down = -(up - axis * (axis @ up)[:, None])
-    other = side - axis * (axis @ side)[:, None]
+    down, aside = (way - axis * (axis @ way)[:, None] for way in (np.array([0.0, 0, -1]), np.array([1.0, 0, 0])))
     size = np.linalg.norm(down, axis=1, keepdims=True)
-    first = np.where(size > 1e-6, down, other)
+    first = np.where(size > 1e-6, down, aside)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     turn = 2 * np.pi * np.arange(n)[:, None] / n
     return np.cos(turn) * first[:, None] + np.sin(turn) * np.cross(axis, first)[:, None]
@@ -247,17 +237,3 @@ def _check(skeleton, clearance, around, spacing, min_confidence):
     check_number("spacing", spacing, "float?", low=0, open_low=True)
     check_number("min_confidence", min_confidence, low=0, high=1)
     check_number("around", around, "int", low=1)
-
-
-def checked_cone(cone: Any) -> tuple[np.ndarray, float]:
-    """Its unit direction, and the least cosine of the angle to it; InvalidParameterError if it is none."""
-    try:
-        direction, degrees = cone
-        vector = np.asarray(direction, float).reshape(3)
-    except (TypeError, ValueError):
-        raise InvalidParameterError(f"cone = {cone!r}: must be three numbers and an angle in degrees") from None
-    if not (np.isfinite(vector).all() and vector.any()):
-        raise InvalidParameterError(f"the direction of cone = {direction!r}: must be finite, and not all 0")
-    angle = check_number("the angle of cone", degrees, low=0, high=180)
-    vector = vector / np.abs(vector).max()
-    return vector / np.linalg.norm(vector), math.cos(math.radians(angle)) - 1e-9  # rounding

@@ -14,7 +14,6 @@ from ..numerics.vectors import unit as directions
 from .branches import branch_table
 from .rows import Rows
 
-METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}  # derived: of the international inch and foot
 PIECE_LENGTH = 4.0  # derived: radii; the chord of a bend as sharp as that is 3 % too short
 TIP_QUANTILE = 0.95  # fitted: share of the points at a tip that its cylinder reaches
 OUTSIDE = 3.0  # fitted: radii aside of a tip, from which on points do not say how far it reaches
@@ -28,7 +27,7 @@ RADIUS_SAMPLES = 8  # derived: places along a cylinder at which its radius is ta
 class Cylinders(Rows, row="cylinder"):
     """One row per cylinder, from the root outwards along each branch.
 
-    Lengths are in the cloud's units. Rows and CSV also have ``diameter``, ``area`` and ``volume``.
+    Lengths are in the cloud's units. Rows and CSV also have ``volume``.
 
     Attributes
     ----------
@@ -52,22 +51,12 @@ class Cylinders(Rows, row="cylinder"):
     confidence: np.ndarray
 
     @property
-    def diameter(self) -> np.ndarray:
-        """Of each cylinder."""
-        return 2 * self.radius
-
-    @property
     def volume(self) -> np.ndarray:
         """Of each cylinder, in the cube of the cloud's units."""
         return np.pi * self.radius**2 * self.length
 
-    @property
-    def area(self) -> np.ndarray:
-        """Lateral surface of each cylinder, in the square of the cloud's units."""
-        return 2 * np.pi * self.radius * self.length
-
     def _columns(self) -> dict[str, list]:
-        return super()._columns() | {name: getattr(self, name).tolist() for name in ("diameter", "area", "volume")}
+        return super()._columns() | {"volume": self.volume.tolist()}
 
 
 def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
@@ -201,14 +190,3 @@ def _place_beyond(curve: np.ndarray, along: np.ndarray, lengths: np.ndarray) -> 
         unit = way / max(float(np.linalg.norm(way)), TINY)
         places = places + np.maximum(more, 0)[:, None] * unit
     return places
-
-
-def metres(unit: float | str) -> float:
-    """A unit of length in metres, given as that or by its name: ``"mm"`` is 0.001."""
-    try:
-        value = METRES[unit] if isinstance(unit, str) and unit in METRES else float(unit)
-    except (TypeError, ValueError):
-        value = np.nan
-    if not 0 < value < np.inf:
-        raise InvalidParameterError(f"unit = {unit!r}: must be metres, above 0, or one of {', '.join(METRES)}")
-    return value

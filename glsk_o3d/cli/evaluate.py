@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -56,8 +57,8 @@ def evaluate(
         warnings.warn(f"{cloud or skeleton}: {message}", SkeletonWarning, stacklevel=1)
     facts: dict[str, Any] = {
         **{"skeleton": str(skeleton), "cloud": cloud and str(cloud), "truth": truth and str(truth)},
-        "assessment": assessment and assessment.as_dict(),
-        "comparison": comparison and comparison.as_dict(),
+        "assessment": assessment and asdict(assessment),
+        "comparison": comparison and asdict(comparison),
     }
 
     def words() -> None:

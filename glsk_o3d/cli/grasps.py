@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 from .console import echo, print_table
 from .options import argument, option, output_option
 from .outputs import Output, check_outputs, tell, write_each
-from .reporting import WrongUsage
 
 if TYPE_CHECKING:
     from ..analysis import GraspCandidates
@@ -19,10 +18,8 @@ GRASP_ENDINGS = (".json", ".csv")
 def grasps(
     skeleton: Annotated[Path, argument("SKELETON", "Of the object; JSON and npz files know its points.")],
     opening: Annotated[float, option("LENGTH", "Of the gripper, at its widest.")],
-    cloud: Annotated[Path | None, option("FILE", "All points of the object, where the skeleton has none.")] = None,
-    scene: Annotated[list[Path] | None, option("FILE", "Points of what else is there; may be repeated.")] = None,
-    plane: Annotated[list[str] | None, option("A,B,C,D", "A table, ax + by + cz + d = 0; may be repeated.")] = None,
-    cone: Annotated[str | None, option("DIRECTION,DEGREES", "Come in no farther from this, such as -z,60.")] = None,
+    cloud: Annotated[Path | None, option("FILE", "Points not to touch; by default those of the skeleton.")] = None,
+    plane: Annotated[str | None, option("A,B,C,D", "A table, ax + by + cz + d = 0.")] = None,
     min_confidence: Annotated[float, option("SHARE", "Of the skeleton, from 0 to 1.")] = 0.5,
     count: Annotated[int, option("N", "How many to show and write, of each place its best first.", "-n", min=1)] = 20,
     output: Annotated[list[Path] | None, output_option("FILE", "json or csv; may be repeated.")] = None,
@@ -30,21 +27,20 @@ def grasps(
     """Find where a gripper with two jaws can take an object.
 
     All lengths are in the file's units. The jaws close across the branches of the skeleton. A grasp is left out where a
-    finger or the palm, on a straight way in, would meet points of the object or of the scene, or the far side of a
-    plane. Space that was not scanned counts as free.
+    finger or the palm, on a straight way in, would meet points, or the far side of a plane. Space that was not scanned
+    counts as free.
     """
     from .. import read_cloud, read_skeleton
     from ..analysis import grasp_candidates
 
     outputs = [Output(path, GRASP_ENDINGS, "grasps are JSON or CSV", _save) for path in output or []]
-    check_outputs(outputs, skeleton, cloud, *(scene or []))
+    check_outputs(outputs, skeleton, cloud)
     found = grasp_candidates(
         read_skeleton(skeleton),
         opening,
         cloud=None if cloud is None else read_cloud(cloud),
-        obstacles=[*(_numbers("--plane", text, 4) for text in plane or []), *map(read_cloud, scene or [])],
+        plane=None if plane is None else plane.split(","),
         min_confidence=min_confidence,
-        cone=None if cone is None else _cone(cone),
     )
     best = found[:count]
     facts = {"skeleton": str(skeleton), "found": len(found), **best.as_dict()}
@@ -53,26 +49,6 @@ def grasps(
 
 def _save(best: GraspCandidates, path: Path) -> None:
     {".json": best.to_json, ".csv": best.to_csv}[path.suffix.lower()](path)
-
-
-def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
-    try:
-        values = tuple(float(word) for word in text.split(","))
-    except ValueError:
-        values = ()
-    if len(values) != count:
-        raise WrongUsage(f"{option} {text}: write {count} numbers with commas between them")
-    return values
-
-
-def _cone(text: str) -> tuple[tuple[float, ...], float]:
-    """A direction, which is an axis with or without a minus or three numbers, and degrees."""
-    direction, _, degrees = text.rpartition(",")
-    name = direction.strip().lower()
-    if name.removeprefix("-") in ("x", "y", "z"):
-        direction = ",".join(str((-1 if name[0] == "-" else 1) * (axis == name[-1])) for axis in "xyz")
-    *way, angle = _numbers("--cone", f"{direction},{degrees}", 4)
-    return tuple(way), angle
 
 
 def _print(best: GraspCandidates, found: int) -> None:

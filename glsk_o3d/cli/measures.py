@@ -48,7 +48,7 @@ def tree(
     output: Annotated[list[Path] | None, output_option("FILE", "Write cylinders, as csv.")] = None,
     root: Root = None,
     up: Annotated[str | None, option("AXIS", "What points up, x to -z; else as it was grown, or z.")] = None,
-    unit: Annotated[str, option("UNIT", "One unit of the file: m, cm, mm, in or ft, or its metres.")] = "m",
+    unit: Annotated[float, option("METRES", "One unit of the file, in metres: 0.001 for millimetres.")] = 1,
 ) -> None:
     """Measure a tree: height, stem, length and volume by order.
 

@@ -48,7 +48,7 @@ DropInvalid = Annotated[bool, Option("--drop-invalid", help="Drop points with Na
 
 PipelineName = Annotated[
     str,
-    option("NAME|FILE", "default, tree, wen2024, cao2010, a plugin's, or a recipe: json or toml, or a result in json."),
+    option("NAME|FILE", "default, tree, wen2024, cao2010, a plugin's, or a recipe or a result in json."),
 ]
 Settings = Annotated[
     list[str] | None,

@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from ..errors import FileFormatError, GlskError
 from ..interop.atomic import check_ending, check_place
@@ -15,8 +15,6 @@ from ..interop.packages import require_for
 from .console import echo, flags, print_json
 from .options import SKELETON_ENDINGS
 from .reporting import WrongUsage
-
-if TYPE_CHECKING:
 
 
 class Output(NamedTuple):

@@ -21,7 +21,7 @@ def to_line_set(skeleton: Skeleton, color: ColorChoice = "branch") -> Any:
     Parameters
     ----------
     skeleton : Skeleton
-    color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1]
+    color : {"branch", "order", "radius", "confidence", "support"} or three floats in [0, 1]
         What the colours of the edges show, or the one colour of all.
 
     Returns
@@ -94,7 +94,7 @@ def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float
     ----------
     skeleton : Skeleton
         A vertex without edges becomes a ball.
-    color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1]
+    color : {"branch", "order", "radius", "confidence", "support"} or three floats in [0, 1]
         What the colours of the branches or vertices show, or the one colour of all.
     radius : float, optional
         One radius for all, in the cloud's units, instead of the sections of the vertices.

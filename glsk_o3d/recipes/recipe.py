@@ -1,28 +1,20 @@
-"""Pipelines as recipes, and these as JSON and TOML files: read and written."""
+"""Pipelines as recipes, and these as JSON files: read and written."""
 
 import dataclasses
 import json
 import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import tomli_w
-
-from ..errors import InvalidParameterError, RecipeError, did_you_mean
-from ..interop.atomic import write_atomically
+from ..errors import RecipeError, did_you_mean
+from ..interop.atomic import write_json
 from ..parameters import FROM, NONE, UNWRITTEN, Parameters, problem_with, shown
 from ..pipeline import RECIPE_VERSION, Pipeline, recipe_of
-from .catalogue import catalogue, find, named_pipeline, serves
+from .catalogue import catalogue, find, serves
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
-
-RECIPE_ENDINGS = (".json", ".toml")
-"""Files that hold recipes."""
+RECIPE_ENDING = ".json"
+"""Of files that hold recipes."""
 
 
 def to_recipe(pipeline: Pipeline) -> dict[str, Any]:
@@ -56,39 +48,35 @@ def to_recipe(pipeline: Pipeline) -> dict[str, Any]:
 
 
 def save_recipe(pipeline: Pipeline, path: str | os.PathLike) -> None:
-    """Write a pipeline as a recipe, with every parameter in it, as JSON or TOML by the ending.
+    """Write a pipeline as a recipe, with every parameter in it, as JSON.
 
     Parameters
     ----------
     pipeline : Pipeline
     path : path-like
-        It appears complete or not at all.
+        Ends in ``.json``. It appears complete or not at all.
 
     Raises
     ------
     InvalidParameterError, RecipeError, OSError
-        See `to_recipe`; or the ending is unknown, or the file cannot be written.
+        See `to_recipe`; or the ending is another, or the file cannot be written.
 
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
     >>> from glsk_o3d import load_recipe, pipelines
     >>> with TemporaryDirectory() as folder:
-    ...     save_recipe(pipelines.default(), f"{folder}/usual.toml")
-    ...     load_recipe(f"{folder}/usual.toml") == pipelines.default()
+    ...     save_recipe(pipelines.default(), f"{folder}/usual.json")
+    ...     load_recipe(f"{folder}/usual.json") == pipelines.default()
     True
     """
-    toml = _ending(path) == ".toml"
-    recipe = to_recipe(pipeline)
-    text = tomli_w.dumps(recipe) if toml else json.dumps(recipe, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-    write_atomically(path, lambda temporary: temporary.write_bytes(text.encode()))
+    _check_ending(path)
+    write_json(path, to_recipe(pipeline))
 
 
-def _ending(path: str | os.PathLike) -> str:
-    ending = Path(path).suffix.lower()
-    if ending not in RECIPE_ENDINGS:
-        raise RecipeError(f"{os.fspath(path)}: unknown ending; recipes are {' or '.join(RECIPE_ENDINGS)} files")
-    return ending
+def _check_ending(path: str | os.PathLike) -> None:
+    if Path(path).suffix.lower() != RECIPE_ENDING:
+        raise RecipeError(f"{os.fspath(path)}: unknown ending; recipes are {RECIPE_ENDING} files")
 
 
 def load_recipe(path: str | os.PathLike) -> Pipeline:
@@ -97,7 +85,7 @@ def load_recipe(path: str | os.PathLike) -> Pipeline:
     Parameters
     ----------
     path : path-like
-        JSON or TOML, by the ending; or the JSON of a result, which holds the recipe that made it.
+        JSON of a recipe, or of a result, which holds the recipe that made it.
 
     Returns
     -------
@@ -113,17 +101,16 @@ def load_recipe(path: str | os.PathLike) -> Pipeline:
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
     ...     path = Path(folder, "mine.json")
-    ...     _ = path.write_text('{"glsk_o3d": {"version": 1}, "extends": "cao2010"}')
-    ...     load_recipe(path) == named_pipeline("cao2010")
-    True
+    ...     _ = path.write_text('{"glsk_o3d": {"version": 1}, "pipeline": [{"filter": "Sampler"}]}')
+    ...     load_recipe(path).stages[0].frame
+    'spread'
     """
-    ending = _ending(path)
+    _check_ending(path)
     data = Path(path).read_bytes()
     try:
-        text = data.decode("utf-8-sig")
-        recipe = json.loads(text) if ending == ".json" else tomllib.loads(text)
-    except Exception as error:  # whatever a parser raises on a hostile file
-        raise RecipeError(f"{os.fspath(path)}: not valid {ending[1:].upper()}: {error}") from error
+        recipe = json.loads(data.decode("utf-8-sig"))
+    except (ValueError, RecursionError) as error:
+        raise RecipeError(f"{os.fspath(path)}: not valid JSON: {error}") from error
     if isinstance(recipe, dict) and isinstance(recipe.get("report"), dict):
         recipe = recipe["report"].get("recipe")
     try:
@@ -154,12 +141,8 @@ def from_recipe(recipe: dict[str, Any]) -> Pipeline:
     --------
     >>> from_recipe({"glsk_o3d": {"version": 1}, "pipeline": [{"filter": "Connector", "radius": "2%"}]})
     Connector(radius='2%', thickness=0.6, links='all')
-    >>> from_recipe({"glsk_o3d": {"version": 1}, "extends": "default", "set": {"RingBuilder": {"k": 20}}}).stages[4].k
-    20
     """
     _check_head(recipe)
-    if "extends" in recipe:
-        return _extended(recipe["extends"], recipe.get("set", {}))
     stages = recipe["pipeline"]
     if not isinstance(stages, list) or not stages:
         raise RecipeError(f"pipeline: must be a list of at least one stage, not {shown(stages)}")
@@ -179,28 +162,12 @@ def _check_head(recipe: Any) -> None:
         raise RecipeError(
             f"glsk_o3d.version: is {shown(version)}; this release reads {RECIPE_VERSION}: update glsk-o3d"
         )
-    keys = ("glsk_o3d", "extends", "set") if "extends" in recipe else ("glsk_o3d", "pipeline")
+    keys = ("glsk_o3d", "pipeline")
     for key in recipe:
         if key not in keys:
             raise RecipeError(f"{key}: {did_you_mean(str(key), keys, 'key of this table')}")
-    if not {"pipeline", "extends"} & set(recipe):
-        raise RecipeError("a recipe has either 'pipeline' or 'extends', and this one lacks both")
-
-
-def _extended(name: Any, changes: Any) -> Pipeline:
-    try:
-        pipeline = named_pipeline(str(name))
-    except InvalidParameterError as error:
-        raise RecipeError(f"extends: {error}") from None
-    if not isinstance(changes, dict):
-        raise RecipeError(f"set: must be a table of filters, not {shown(changes)}")
-    read: dict[str, Any] = {}
-    for owner, values in changes.items():
-        cls = find(owner)
-        if cls is None:
-            raise RecipeError(f"set.{owner}: {did_you_mean(str(owner), catalogue(), 'filter or rule')}")
-        read |= {f"{owner}.{field}": value for field, value in _values(cls, values, f"set.{owner}").items()}
-    return _valid(lambda: pipeline.with_options(read), "set")
+    if "pipeline" not in recipe:
+        raise RecipeError(f"pipeline: is missing; a recipe is a table such as {example}")
 
 
 def _part(table: Any, path: str, role: str) -> Parameters:

@@ -184,9 +184,6 @@ def test_unknown_confidence_and_radii():
         (dict(gripper=1.0, spacing=0.0), "spacing"),
         (dict(gripper=1.0, min_confidence=1.1), "min_confidence"),
         (dict(gripper=1.0, around=0), "around = 0"),
-        (dict(gripper=1.0, cone=(0, 0, 1)), r"cone = \(0, 0, 1\): must be three numbers and an angle"),
-        (dict(gripper=1.0, cone=((0, 0, 0), 9)), r"direction of cone = \(0, 0, 0\): must be finite, and not all 0"),
-        (dict(gripper=1.0, cone=((0, 0, 1), 200)), "angle of cone = 200: .* at most 180"),
     ],
 )
 def test_wrong_parameters(options, said):
@@ -222,18 +219,3 @@ def test_lines_of_the_gripper():
     assert np.asarray(lines.lines).shape == (4 * len(grasps), 2)
     ends = np.asarray(lines.points)[np.asarray(lines.lines)]
     assert np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).min() > 0.4 * grasps.opening.min()
-
-
-def test_files(tmp_path):
-    grasps = grasp_candidates(replace(SAUROPOD, confidence=()), 0.2, min_confidence=0)
-    rows = list(grasps)
-    assert np.isnan([row["confidence"] for row in rows]).all()
-    for name in ("position", "approach", "closing"):
-        values = [[row[f"{name}_{axis}"] for axis in "xyz"] for row in rows]
-        np.testing.assert_array_equal(values, getattr(grasps, name))
-    grasps.to_json(tmp_path / "g.json")
-    data = json.loads((tmp_path / "g.json").read_text())
-    assert (data["places"], data["left_out"]) == (grasps.places, grasps.left_out)
-    np.testing.assert_array_equal([row["pose"] for row in data["grasps"]], grasps.poses)
-    np.testing.assert_array_equal([row["opening"] for row in data["grasps"]], grasps.opening)
-    assert {row["confidence"] for row in data["grasps"]} == {None}

@@ -86,7 +86,7 @@ def test_cylinders_grow_from_each_other(tree):
     same = inner[table.order[inner] == table.order[table.parent[inner]]]
     np.testing.assert_allclose(table.start_point[same], table.end_point[table.parent[same]], atol=1e-9)
     assert set(table.order.tolist()) == {0, 1}
-    assert [*next(iter(table))][-3:] == ["diameter", "area", "volume"]
+    assert [*next(iter(table))][-1] == "volume"
     np.testing.assert_allclose(table.volume, np.pi * table.radius**2 * table.length)
 
 
@@ -117,7 +117,7 @@ def test_a_branch_begins_where_it_has_left_its_parent(thin, degrees):
     assert table.length[table.order == 1].sum() == pytest.approx(10 - inside, abs=0.06)
 
 
-@pytest.mark.parametrize("options", [{"up": "w"}, {"up": "--z"}, {"unit": 0}, {"unit": np.nan}, {"unit": "mile"}])
+@pytest.mark.parametrize("options", [{"up": "w"}, {"up": "--z"}, {"unit": 0}, {"unit": np.nan}, {"unit": "mm"}])
 def test_wrong_options(options):
     with pytest.raises(InvalidParameterError, match=r"up = |unit = "):
         tree_measures(by_hand(), **options)
@@ -155,11 +155,11 @@ def test_a_file_without_a_report_keeps_its_root(tmp_path):
         assert np.isnan(tree_measures(read_skeleton(tmp_path / "t.ply")).traced)
 
 
-def ring(radius, height, n, rng, degrees=360.0, noise=0.0):
+def ring(radius, height, n, rng, degrees=360.0):
     """Points of a stem of 3 m seen over so many degrees, and a skeleton whose radii are half of the true ones."""
     turn = np.radians(degrees) * (rng.random(n) - 0.5)
     points = np.column_stack([np.cos(turn), np.sin(turn), height * rng.random(n)])
-    points[:, :2] *= (radius + noise * rng.normal(size=n))[:, None]
+    points[:, :2] *= radius
     level = np.linspace(0, height, 31)
     up = np.column_stack([0 * level, 0 * level, level])
     edges = np.column_stack([np.arange(30), np.arange(1, 31)])
@@ -174,16 +174,6 @@ def test_the_stem_is_measured_on_its_points():
         found = tree_measures(ring(0.15, 3.0, 6000, rng, degrees), 0, up="z")
         assert found.stem_diameter == pytest.approx(0.3, abs=1e-9)
         assert found.stem_arc == pytest.approx(degrees, abs=10)
-        assert found.stem_rms < 1e-9
-        assert found.stem_points == pytest.approx(200, abs=50)
-    widths = []
-    for degrees in (360, 180, 90):
-        found = tree_measures(ring(0.15, 3.0, 6000, rng, degrees, noise=0.003), 0, up="z")
-        assert found.stem_rms == pytest.approx(0.003, rel=0.2)
-        low, high = found.stem_interval
-        assert low < 0.3 < high
-        widths.append(high - low)
-    assert widths[0] < widths[1] < widths[2]
 
 
 @pytest.mark.parametrize(
@@ -193,7 +183,7 @@ def test_why_a_stem_has_no_diameter(degrees, n, cause):
     stem = ring(0.15, 3.0, n, np.random.default_rng(1), degrees)
     with pytest.warns(SkeletonWarning, match=cause):
         found = tree_measures(stem, 0, up="z")
-    assert np.isnan([found.stem_diameter, *found.stem_interval]).all()
+    assert np.isnan([found.stem_diameter, found.stem_arc]).all()
     assert len(found.doubts) == 1
     with pytest.warns(SkeletonWarning, match="has no points"):
         tree_measures(replace(stem, points=np.empty((0, 3)), normals=np.empty((0, 3)), vertex_of_point=[]), 0, up="z")
@@ -210,8 +200,8 @@ def test_volume_is_that_of_parts_with_a_surface():
     stem = ring(0.15, 3.0, 6000, np.random.default_rng(3))
     upper = replace(stem, confidence=(np.arange(31) < 16).astype(float))
     whole, half = (tree_measures(it, 0, up="z") for it in (stem, upper))
-    assert (whole.traced, whole.traced_volume) == (0, 0)
-    assert sum(half.volume) + half.traced_volume == pytest.approx(sum(whole.volume))
+    assert whole.traced == 0
+    table = cylinders(upper, 0)
+    assert sum(half.volume) == pytest.approx(table.volume[table.confidence > 0].sum())
+    assert sum(half.volume) < 0.7 * sum(whole.volume)
     assert half.traced == pytest.approx(0.5, abs=0.1)
-    np.testing.assert_allclose(half.volume_interval[0], 0.92 * sum(half.volume))
-    np.testing.assert_allclose(half.volume_interval[1], 1.08 * sum(whole.volume))  # it is as thick above

@@ -1,7 +1,7 @@
 """`glsk evaluate`: how good a skeleton is."""
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def test_without_a_truth(invoke, scans, ring, moved):
     run = invoke("evaluate", "s.json", scans / "ring.ply")
     assert (run.exit_code, run.stderr) == (0, "")
     report = json.loads(invoke("evaluate", "s.json", scans / "ring.ply", "--json").stdout)
-    assert report["assessment"] == assess(moved, ring.points).as_dict()
+    assert report["assessment"] == asdict(assess(moved, ring.points))
     assert report["truth"] is report["comparison"] is None
     words = " ".join(run.stdout.split())
     assert words.startswith(f"assessment centredness {report['assessment']['centredness']:.6g} boundedness ")
@@ -44,7 +44,7 @@ def test_with_the_cloud_of_its_file(invoke, tmp_path, ring, moved):
     held = replace(moved, points=ring.points, vertex_of_point=None, normals=None)
     save_skeleton(held, tmp_path / "held.npz")
     told = json.loads(invoke("evaluate", "held.npz", "--json").stdout)
-    assert (told["cloud"], told["assessment"]) == (None, assess(moved, ring.points).as_dict())
+    assert (told["cloud"], told["assessment"]) == (None, asdict(assess(moved, ring.points)))
     refused = invoke("evaluate", "s.json")
     assert refused.exit_code == 2
     assert "s.json: holds no cloud" in refused.stderr
@@ -53,7 +53,7 @@ def test_with_the_cloud_of_its_file(invoke, tmp_path, ring, moved):
 def test_with_a_truth(invoke, scans, ring, moved):
     words = ("evaluate", "s.json", scans / "ring.ply", "--truth", "truth.npz")
     told = json.loads(invoke(*words, "--json").stdout)
-    assert told["comparison"] == compare(moved, ring).as_dict()
+    assert told["comparison"] == asdict(compare(moved, ring))
     assert told["comparison"]["error"] == pytest.approx(0.5)
     rows = dict(line.split(maxsplit=1) for line in invoke(*words).stdout.splitlines() if " " in line)
     assert (float(rows["error"]), rows["perfect"]) == (pytest.approx(0.5), "yes")

@@ -1,4 +1,4 @@
-"""`glsk grasps`: the lines, the files, the scene from files, and what it says when something is wrong."""
+"""`glsk grasps`: the lines, the files, the points from a file, and what it says when something is wrong."""
 
 import csv
 import json
@@ -21,13 +21,13 @@ def rod(tmp_path):
 
 
 def test_lines_files_and_json_agree(invoke, tmp_path, rod):
-    found = grasp_candidates(read_skeleton(tmp_path / rod), 0.4, obstacles=[(0, 0, 1, 0.25)], cone=((0, 0, -1), 60))
-    words = ("grasps", rod, "--opening", 0.4, "--plane", "0,0,1,0.25", "--cone", "-z,60", "-n", 5)
+    found = grasp_candidates(read_skeleton(tmp_path / rod), 0.4, plane=(0, 0, 1, 0.25))
+    words = ("grasps", rod, "--opening", 0.4, "--plane", "0,0,1,0.25", "-n", 5)
     result = invoke(*words, "-o", "g.json")
     assert (result.exit_code, result.stderr) == (0, "")
     lines = result.stdout.splitlines()
     assert lines[0] == f"{len(found)} grasps at 9 places"
-    assert lines[1] == f"left out: {5 * 9} ways in outside the cone"
+    assert lines[1] == f"left out: {5 * 9} ways in behind the plane"
     assert lines[-1] == "wrote g.json"
     rows = [line for line in lines if line.endswith(" 0") and "left out" not in line]
     assert len(rows) == 5
@@ -45,15 +45,14 @@ def test_lines_files_and_json_agree(invoke, tmp_path, rod):
     assert invoke(*words, "-q").stdout == ""
 
 
-def test_the_scene_and_the_points_come_from_files(invoke, tmp_path, rod, write_scan):
+def test_the_points_come_from_a_file(invoke, tmp_path, rod, write_scan):
     skeleton = read_skeleton(tmp_path / rod)
     save_skeleton(skeleton, tmp_path / "axis.ply")
-    write_scan(tmp_path / "rod.ply", skeleton.points)
     wall = np.stack(np.meshgrid(np.arange(-1, 1, 0.02), [0.3], np.arange(-1, 1, 0.02)), axis=-1).reshape(-1, 3)
-    write_scan(tmp_path / "wall.ply", wall)
-    other = ("grasps", "axis.ply", "--cloud", "rod.ply", "--min-confidence", 0, "--scene", "wall.ply", "-n", 99)
+    write_scan(tmp_path / "rod.ply", np.concatenate([skeleton.points, wall]))
+    other = ("grasps", "axis.ply", "--cloud", "rod.ply", "--min-confidence", 0, "-n", 99)
     facts = json.loads(invoke(*other, "--opening", 0.4, "--json").stdout)
-    assert any(reason.endswith("in an obstacle") for reason in facts["left_out"])
+    assert any(reason.endswith("touch points") for reason in facts["left_out"])
     assert facts["found"] == len(facts["grasps"]) > 9
     assert min(row["approach"][1] for row in facts["grasps"]) > -1e-9
     assert {row["confidence"] for row in facts["grasps"]} == {None}

@@ -14,7 +14,7 @@ TABLE = """
     2 branches y.ply --root 4                              | root = 4: there are vertices 0 to 3
     2 branches y.ply -o y.txt                              | y.txt: the table is CSV and its name ends in .csv
     2 tree y.ply --root a,b,c                              | root = 'a,b,c': must be an axis
-    2 tree y.ply --unit 0                                  | unit = '0': must be metres, above 0, or one of m, cm, mm
+    2 tree y.ply --unit 0                                  | unit = 0.0: must be above 0
     2 tree o.ply                                           | see 'glsk skeletonize --pipeline tree'
     2 tree two.json                                        | --pipeline tree' and 'glsk edit --largest'
     2 tree y.ply -o c.xlsx                                 | c.xlsx: the file is a table of cylinders and its name ends
@@ -30,14 +30,12 @@ TABLE = """
     1 rig o.ply -o r.glb                                   | 1 loop(s): pass --cut-loops to drop
     1 rig bare.obj -o r.glb                                | a rig needs radii or points: read the skeleton from
     2 grasps rod.npz --opening -1                          | --opening = -1.0: must be above 0
-    2 grasps rod.npz --opening 1 --plane 0,0,1             | --plane 0,0,1: write 4 numbers with commas
-    2 grasps rod.npz --opening 1 --plane 0,0,0,1           | is no plane
-    2 grasps rod.npz --opening 1 --cone z                  | --cone ,z: write 4 numbers
-    2 grasps rod.npz --opening 1 --cone z,270              | the angle of cone = 270.0: must be
+    2 grasps rod.npz --opening 1 --plane 0,0,1             | must be finite a, b, c, d of ax + by + cz + d = 0
+    2 grasps rod.npz --opening 1 --plane 0,0,0,1           | must be finite a, b, c, d of ax + by + cz + d = 0
     2 grasps rod.npz --opening 1 -o g.ply                  | the grasps are JSON or CSV and its name ends in .json
     2 grasps y.ply --opening 1                             | has no confidence, perhaps due to its file: give --min-
     2 grasps y.ply --opening 1 --min-confidence 0          | has no points of the object: give --cloud FILE
-    1 grasps rod.npz --opening 1 --scene none.ply          | none.ply: no such file
+    1 grasps rod.npz --opening 1 --cloud none.ply          | none.ply: no such file
     1 evaluate y.ply SCANS/ring.ply --truth none.npz       | none.npz: not a valid truth: the truth has no nodes
     1 evaluate dot.ply SCANS/ring.ply                      | dot.ply: the skeleton has no edge with a length
     1 evaluate y.ply few.xyz                               | few.xyz: no part of the skeleton has 6 points around it

@@ -24,8 +24,8 @@ for ending in FORMATS.keys() - {".graphml"}:
     glsk.save_skeleton(skeleton, f"s{ending}", cut_loops=True)
     if ending in READABLE:
         glsk.read_skeleton(f"s{ending}")
-glsk.save_recipe(glsk.pipelines.default(), "r.toml")
-assert glsk.load_recipe("r.toml") == glsk.pipelines.default()
+glsk.save_recipe(glsk.pipelines.default(), "r.json")
+assert glsk.load_recipe("r.json") == glsk.pipelines.default()
 skeleton.to_line_set(), glsk.to_tensor_line_set(skeleton), glsk.to_tubes(skeleton, (1, 0, 0))
 glsk.annotate(skeleton, points, color=(1, 0, 0))
 table = glsk.analysis.branch_table(skeleton)
@@ -89,7 +89,7 @@ def test_without_extras(bare, tmp_path):
     for name, message in said.items():
         assert f'pip install "glsk-o3d[{NAMED[name]}]"' in message, name
     left = {path.name for path in tmp_path.iterdir() if path.name.partition(".")[0] not in ("s", "scan")}
-    assert left - {"out"} == {"r.toml", "branches.csv"}
+    assert left - {"out"} == {"r.json", "branches.csv"}
     assert not list(tmp_path.glob("*.png")) + list(tmp_path.glob("*.html"))
 
 

@@ -7,7 +7,6 @@ import pytest
 import glsk_o3d as glsk
 from glsk_o3d import InvalidParameterError, annotate, samples
 from glsk_o3d.analysis import branch_table, segment
-from glsk_o3d.io.colors import thickness_shades
 
 POINTS = samples.y_junction(800).points
 RNG = np.random.default_rng(1)
@@ -51,7 +50,6 @@ def test_tensor_clouds_keep_what_they_have_and_gain_ours(cloud, skeleton):
         "radius": skeleton.radii[vertex].astype(kind),
         "confidence": skeleton.confidence[vertex].astype(kind),
     }
-    assert annotated.pop("thickness").dtype == kind
     assert_equal(annotated, before | {name: values[:, None] for name, values in gained.items()})
     assert_equal(held(cloud), before)
     assert not np.shares_memory(annotated["positions"], before["positions"])
@@ -98,8 +96,5 @@ def test_colours(cloud, skeleton):
     brightness = annotate(skeleton, cloud, color="radius").point.colors.numpy() @ [0.2, 0.7, 0.1]
     radius = skeleton.radii[skeleton.vertex_of_point]
     assert brightness[radius.argmin()] < brightness[radius.argmax()]
-    marked = annotate(skeleton, cloud, color="thickness").point
-    expected = np.round(255 * thickness_shades(marked.thickness.numpy()[:, 0].astype(float)))
-    assert np.abs(marked.colors.numpy() - expected).max() <= 1
     with pytest.raises(InvalidParameterError, match="color"):
         annotate(skeleton, cloud, color="size")

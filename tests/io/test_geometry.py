@@ -50,7 +50,7 @@ def test_line_sets_in_colour():
         count = len(np.unique(legacy, axis=0))
         assert count == distinct if distinct else count > 5
     bare = graph(branched.vertices, branched.edges, np.full(len(branched.radii), np.nan))
-    for color in ("radius", "confidence", "thickness"):
+    for color in ("radius", "confidence"):
         assert (np.asarray(to_line_set(bare, color).colors) == 0.6).all()
 
 

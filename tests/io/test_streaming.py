@@ -159,18 +159,14 @@ def test_labels_are_those_of_annotate(scans, skeleton, tmp_path, ending, where):
         np.testing.assert_array_equal(found.scan_green.numpy()[:, 0], cloud.point.colors.numpy()[:, 1])
 
 
-def test_thickness_is_that_of_the_points_of_the_skeleton_and_not_known_without(ring, tmp_path):
+def test_a_skeleton_without_its_cloud(ring, tmp_path):
     scan, marked = tmp_path / "scan.ply", tmp_path / "marked.ply"
     save_tensor_cloud(annotate(ring), scan)
-    annotate_file(ring, scan, marked)
-    found = read_tensor_cloud(marked).point.thickness.numpy()
-    np.testing.assert_array_equal(found, annotate(ring).point.thickness.numpy())
     save_skeleton(ring, tmp_path / "ring.ply")
     bare = read_skeleton(tmp_path / "ring.ply")
     annotate_file(bare, scan, marked)
     found, expected = read_tensor_cloud(marked).point, annotate(bare, torus(1000).points).point
     np.testing.assert_array_equal(found.skeleton_vertex.numpy(), expected.skeleton_vertex.numpy())
-    assert np.isnan(found.thickness.numpy()).all()
 
 
 def test_an_attribute_that_is_unset_in_early_blocks(ring, tmp_path):
@@ -207,7 +203,7 @@ def test_columns_of_a_ply_file_keep_their_types_where_open3d_reads_these(ring, t
         values = found[renamed.get(name, name)]
         assert values.dtype == {"u2": "<i4", "i1": "<i4", "u4": "<f8"}.get(kind, f"<{kind}"), name
         np.testing.assert_array_equal(values, rows[name], name)
-    assert {found[name].dtype for name in ("radius", "confidence", "thickness")} == {np.dtype("<f4")}
+    assert {found[name].dtype for name in ("radius", "confidence")} == {np.dtype("<f4")}
 
 
 # ------------------------------------------------------------------------------------------------------ what goes wrong

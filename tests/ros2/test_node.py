@@ -65,26 +65,24 @@ def test_parameters_choose_pipeline_and_settings(ros, cloud, points, tmp_path, r
     node = ros.node(pipeline="tree", set=["k=20"])
     node.on_cloud(cloud)
     np.testing.assert_array_equal(line_ends(node.published[0][1], rows), other.vertices[other.edges].reshape(-1, 3))
-    glsk.save_recipe(glsk.pipelines.tree().with_options(k=20), tmp_path / "mine.toml")
-    same = ros.node(pipeline=str(tmp_path / "mine.toml"))
+    glsk.save_recipe(glsk.pipelines.tree().with_options(k=20), tmp_path / "mine.json")
+    same = ros.node(pipeline=str(tmp_path / "mine.json"))
     same.on_cloud(cloud)
     np.testing.assert_array_equal(line_ends(same.published[0][1], rows), line_ends(node.published[0][1], rows))
 
 
-def test_with_an_opening_poses_are_grasps_above_a_table_and_in_a_cone(ros, cloud, expected, rows):
-    table, where = [0.0, 0.0, 1.0, 0.25], [0.0, 1.0, -1.0]
-    options = dict(obstacles=[table], cone=(where, 50))
-    for more, less in (({}, {}), (dict(plane=table, approach=where, approach_angle=50.0), options)):
-        node = ros.node(opening=0.6, **more)
+def test_with_an_opening_poses_are_grasps_above_a_table(ros, cloud, expected, rows):
+    for options in ({}, dict(plane=[0.0, 0.0, 1.0, 0.25])):
+        node = ros.node(opening=0.6, **options)
         node.on_cloud(cloud)
-        grasps = grasp_candidates(expected, 0.6, **less)
+        grasps = grasp_candidates(expected, 0.6, **options)
         assert len(grasps) > 8
         poses = node.published[1][1].poses
         np.testing.assert_array_equal(rows(pose.position for pose in poses), grasps.position)
         turns = Rotation.from_quat([[q.x, q.y, q.z, q.w] for q in (pose.orientation for pose in poses)]).as_matrix()
         np.testing.assert_allclose(turns[:, :, 0], grasps.closing, atol=1e-12)
         np.testing.assert_allclose(turns[:, :, 2], grasps.approach, atol=1e-12)
-    assert len(grasps) < len(grasp_candidates(expected, 0.6, cone=(where, 50))) < len(grasp_candidates(expected, 0.6))
+    assert len(grasps) < len(grasp_candidates(expected, 0.6))
 
 
 def test_without_a_grasp_the_markers_go_out_with_a_warning(ros, cloud):
@@ -123,8 +121,7 @@ def test_a_bad_cloud_is_one_warning_and_the_next_is_served(ros, cloud, header, m
         (dict(set=["k=no"]), "k = 'no'"),
         (dict(opening=float("nan")), "opening = nan"),
         (dict(plane=[0.0, 0.0, 1.0]), r"plane = \[0.0, 0.0, 1.0\]: must be a, b, c, d"),
-        (dict(plane=[0.0, 0.0, 1.0, 0.0]), "are for grasps: give the opening"),
-        (dict(approach_angle=181.0), "the angle of cone = 181.0: .* at most 180"),
+        (dict(plane=[0.0, 0.0, 1.0, 0.0]), "is for grasps: give the opening"),
     ],
 )
 def test_wrong_parameters_end_the_node_at_once(ros, parameters, message):
@@ -181,7 +178,7 @@ def test_the_script_does_what_the_node_does(recorded, types, tmp_path, expected,
     with pytest.raises(SystemExit, match="opening = -1"):
         bag.main([str(recorded), str(tmp_path / "no"), "--topic", "/points", "--opening", "-1"])
     words = [str(recorded), str(tmp_path / "no"), "--topic", "/points", "--plane", "0", "0", "-1", "inf"]
-    with pytest.raises(SystemExit, match="is no plane"):
+    with pytest.raises(SystemExit, match="must be finite a, b, c, d"):
         bag.main(words)
     bag.main([str(recorded), str(tmp_path / "out"), "--topic", "/points"])
     said = capsys.readouterr()

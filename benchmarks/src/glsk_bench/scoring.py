@@ -169,7 +169,7 @@ def score(truth: Any, vertices: Any, edges: Any) -> Scores:
         raise InvalidParameterError(f"the skeleton has invalid vertices or edges: {error}") from None
     check_size(float(np.median(axis.radii)), places, links)
     answer = Skeleton(places, links, (), (), (), ())  # type: ignore[arg-type]
-    found = compare(answer, axis).as_dict()
+    found = asdict(compare(answer, axis))
     if isinstance(axis, ThingTruth):
         found |= of_thing(axis, answer, found["topology"])
     return Scores(**{name: found[name] for name in Scores.__dataclass_fields__ if name in found})

@@ -16,7 +16,7 @@ from rosbags.typesys import Stores, get_typestore
 from glsk_o3d import GlskError
 
 from .messages import Make
-from .skeletonizer import DOWN, NO_PLANE, Skeletonizer
+from .skeletonizer import NO_PLANE, Skeletonizer
 
 CLOUD = "sensor_msgs/msg/PointCloud2"
 RESULTS = {"markers": "visualization_msgs/msg/MarkerArray", "poses": "geometry_msgs/msg/PoseArray"}
@@ -97,8 +97,6 @@ def main(words: list[str] | None = None) -> None:
     parser.add_argument("--min-points", type=int, default=100, help="fewest points of a cloud to work on")
     parser.add_argument("--opening", type=float, default=0.0, help="widest opening of a gripper: poses are grasps")
     parser.add_argument("--plane", type=float, nargs=4, default=NO_PLANE, metavar=tuple("ABCD"), help="a table")
-    parser.add_argument("--approach", type=float, nargs=3, default=DOWN, metavar=tuple("XYZ"), help="a direction")
-    parser.add_argument("--approach-angle", type=float, default=180.0, help="degrees that grasps may differ from it")
     options = vars(parser.parse_args(words))
     try:
         print(f"{convert(**options)} clouds skeletonised: {options['target']}")

@@ -17,7 +17,7 @@ from visualization_msgs.msg import MarkerArray
 
 from glsk_o3d import GlskError
 
-from .skeletonizer import DOWN, NO_PLANE, Skeletonizer
+from .skeletonizer import NO_PLANE, Skeletonizer
 
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Of clouds, as sensors send them: those that come while one is worked on are dropped, but for the last."""
@@ -50,8 +50,6 @@ class SkeletonizeNode(Node):
             min_points=self.declare_parameter("min_points", 100).value,
             opening=self.declare_parameter("opening", 0.0).value,
             plane=self.declare_parameter("plane", list(NO_PLANE)).value,
-            approach=self.declare_parameter("approach", list(DOWN)).value,
-            approach_angle=self.declare_parameter("approach_angle", 180.0).value,
         )
         self.markers = self.create_publisher(MarkerArray, "~/markers", LATEST)
         self.poses = self.create_publisher(PoseArray, "~/poses", LATEST)

@@ -11,14 +11,13 @@ import numpy as np
 
 from glsk_o3d import InvalidCloudError, InvalidParameterError, Skeleton, SkeletonWarning
 from glsk_o3d.analysis import Gripper, grasp_candidates
-from glsk_o3d.analysis.grasp_checks import obstacle_list
-from glsk_o3d.analysis.grasps import checked_cone
+from glsk_o3d.analysis.grasp_checks import checked_plane
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.driver import as_pipeline
 
 from .messages import Make, frames_of, markers_of, points_of, poses_of
 
-NO_PLANE, DOWN = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, -1.0)
+NO_PLANE = (0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -48,16 +47,11 @@ class Skeletonizer:
         Widest opening of a gripper, in the cloud's units; 0 for none.
     plane : sequence of 4 floats
         A table, ax + by + cz + d = 0, in the frame of the cloud: no grasp reaches behind it. Four zeros for none.
-    approach : sequence of 3 floats
-        A direction in the frame of the cloud.
-    approach_angle : float
-        Degrees by which the approach of a grasp may differ from it; with 180 none is left out.
 
     Raises
     ------
     GlskError
-        The pipeline, its recipe, a setting, the opening, the plane or the cone is wrong, or there is a plane or a cone
-        without an opening.
+        The pipeline, its recipe, a setting, the opening or the plane is wrong, or there is a plane without an opening.
     """
 
     def __init__(
@@ -68,8 +62,6 @@ class Skeletonizer:
         min_points: int = 100,
         opening: float = 0.0,
         plane: Sequence[float] = NO_PLANE,
-        approach: Sequence[float] = DOWN,
-        approach_angle: float = 180.0,
     ) -> None:
         if not opening >= 0:
             raise InvalidParameterError(f"opening = {opening}: must be 0, for no grasps, or more")
@@ -77,15 +69,11 @@ class Skeletonizer:
             raise InvalidParameterError(
                 f"plane = {list(plane)}: must be a, b, c, d of ax + by + cz + d = 0; all 0 for none"
             )
-        checked_cone((approach, approach_angle))
         self.make, self.min_points = make, min_points
         self.gripper = Gripper(opening) if opening else None
-        self.where = {
-            "obstacles": obstacle_list([plane] if any(plane) else []),
-            "cone": (approach, approach_angle),
-        }
-        if not opening and (any(plane) or approach_angle < 180):
-            raise InvalidParameterError("plane and approach_angle are for grasps: give the opening of the gripper, too")
+        self.plane = checked_plane(plane) if any(plane) else None
+        if not opening and any(plane):
+            raise InvalidParameterError("plane is for grasps: give the opening of the gripper, too")
         self.pipeline = override(as_pipeline(pipeline), filter(None, settings))
 
     def __call__(self, cloud: Any) -> Results:
@@ -105,7 +93,7 @@ class Skeletonizer:
             if self.gripper is None:
                 frames = frames_of(skeleton)
             else:
-                frames = grasp_candidates(skeleton, self.gripper, **self.where).poses
+                frames = grasp_candidates(skeleton, self.gripper, plane=self.plane).poses
         return Results(
             markers_of(skeleton, cloud.header, self.make),
             poses_of(frames, cloud.header, self.make),

@@ -14,8 +14,6 @@ PARAMETERS = {
     "min_points": (int, "100", "Fewest points of a cloud to work on."),
     "opening": (float, "0.0", "Widest opening of a gripper [m]: poses are then grasps; 0 for frames along the curve."),
     "plane": (List[float], "[0.0, 0.0, 0.0, 0.0]", "A table, ax + by + cz + d = 0, for grasps; all 0 for none."),  # noqa: UP006
-    "approach": (List[float], "[0.0, 0.0, -1.0]", "A direction that approaches of grasps keep to."),  # noqa: UP006
-    "approach_angle": (float, "180.0", "Degrees that they may differ from it."),
 }
 
 
