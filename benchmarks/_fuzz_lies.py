@@ -288,8 +288,6 @@ BOMBS: dict[str, Callable[[int], bytes]] = {
     ),
     "skeleton .npz zeros": _zipped,
     "skeleton .json brackets": lambda n: b"[" * n,
-    "skeleton .graphml entities": lambda n: _entities("graphml") + b"<graphml>&h;</graphml>",
-    "skeleton .graphml deep": lambda n: b"<graphml>" * n + b"</graphml>" * n,
     "skeleton .swc rows": lambda n: b"1 0 0 0 0 0 -1\n" * n,
     "script .mlx entities": lambda n: _entities("FilterScript") + b"<FilterScript>&h;</FilterScript>",
     "script .mlx deep": lambda n: b"<FilterScript>" * n + b"</FilterScript>" * n,
@@ -329,7 +327,6 @@ NAMING: dict[str, Callable[[str], bytes]] = {
     "cloud .obj goes on": lambda at: f"mt\\\nllib {at}\n{_TRIANGLE}".encode(),
     "cloud .obj map": lambda at: f"mtllib given.mtl\n{_TRIANGLE}".encode(),
     "script .mlx entity": lambda at: f'<!DOCTYPE FilterScript SYSTEM "{at}"><FilterScript/>'.encode(),
-    "skeleton .graphml entity": lambda at: f'<!DOCTYPE graphml SYSTEM "{at}"><graphml/>'.encode(),
     "list .txt clouds": lambda at: f"{at}\n".encode(),
 }
 """What names another file, by kind and ending."""

@@ -75,7 +75,7 @@ def convert(
 def rig(
     skeleton: SkeletonFile,
     mesh: Annotated[Path | None, argument("MESH", "A mesh or a cloud; by default the skeleton's tubes.")] = None,
-    output: Annotated[list[Path] | None, output_option("FILE", "The rig: glb, or bvh without surface.")] = None,
+    output: Annotated[list[Path] | None, output_option("FILE", "The rig: glb.")] = None,
     root: Annotated[Any, root_option("Which joint moves all others")] = None,
     cut_loops: Annotated[bool, Option("--cut-loops", help="Cut loops open; the surface stays whole.")] = False,
     up: Annotated[str, option("AXIS", "Which axis of the data points up: z or y.")] = "z",
@@ -86,12 +86,12 @@ def rig(
     by their branch and move what is next to them. Textures do not go along.
     """
     from .. import FileFormatError, read_cloud, read_skeleton, save_rig
-    from ..io.formats.gltf import RIG_ENDINGS
+    from ..io.formats.gltf import RIG_ENDING
     from ..io.scans import read_mesh
 
     if output is None or len(output) > 1:
         raise WrongUsage(f"{'nothing to write' if output is None else 'rig writes one file'}: give one output with -o")
-    check_outputs([Output(output[0], RIG_ENDINGS, "rig is glTF or BVH", save_rig)], skeleton, mesh)
+    check_outputs([Output(output[0], (RIG_ENDING,), "rig is glTF", save_rig)], skeleton, mesh)
     curve = read_skeleton(skeleton)
     surface: Any = None
     if mesh is not None:

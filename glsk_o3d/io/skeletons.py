@@ -9,7 +9,6 @@ from typing import NamedTuple
 from ..analysis.comparison import Truth
 from ..errors import FileFormatError, brief
 from ..interop.atomic import write_atomically
-from ..interop.packages import require_for
 from ..refinement.rooted import RootPlace
 from ..skeleton import Skeleton
 from .formats import fields, gltf, lines, ply, trees
@@ -33,8 +32,6 @@ FORMATS: dict[str, Format] = {
     ".json": Format(fields.write_json, fields.read_json),
     ".npz": Format(fields.write_npz, fields.read_npz),
     ".swc": Format(trees.write_swc, trees.read_swc, trees=True),
-    ".graphml": Format(lines.write_graphml, lines.read_graphml),
-    ".cgal": Format(lines.write_cgal, lines.read_cgal),
     ".vtp": Format(lines.write_vtp),
     ".glb": Format(gltf.write, trees=True),
     ".urdf": Format(trees.write_urdf, trees=True),
@@ -62,14 +59,12 @@ def save_skeleton(
     .ply         vertices, edges, radii, half axes               Open3D (``read_line_set``), MeshLab
     .obj         vertices, edges as ``l`` lines; no radii        MeshLab, Blender, CloudCompare
     .swc         trees, with radii                               neuron and plant tools
-    .graphml     x, y, z, radius of nodes, length of edges       networkx, Gephi, Cytoscape
-    .cgal        a line per branch: count, x y z, ...; no radii  CGAL
     .vtp         vertices, branches, radii, confidence           ParaView, Slicer, vmtk
     .glb         trees, as an armature with a skin of tubes      Blender
     .urdf        trees, as a robot of cylinders and balls        ROS, simulators
     ============ =============================================== =======================================
 
-    Formats below CGAL's are only written, not read. Numbers keep their full precision, except in glTF, which has
+    Formats below SWC are only written, not read. Numbers keep their full precision, except in glTF, which has
     float32. The file appears complete or not at all; after an error an existing file is unchanged.
 
     Parameters
@@ -125,15 +120,13 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
     Skeleton
         JSON and npz give everything. Other formats give only the graph: `points`, `normals` and `vertex_of_point` are
         empty, and missing radii are NaN. Edges are sorted; repeated edges and those from a vertex to itself are
-        dropped. Polylines are joined at ends with equal coordinates.
+        dropped.
 
     Raises
     ------
     FileNotFoundError
     FileFormatError
         A folder, a cloud, an unknown ending, or a file that is damaged or from a newer release.
-    MissingPackageError
-        Of GraphML, without the extra [graph].
 
     Examples
     --------
@@ -150,7 +143,6 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
     read = FORMATS[ending].read
     if read is None:
         raise FileFormatError(f"{path}: {ending} is only written; read are {', '.join(READABLE)}")
-    require_for(ending)
     data = path.read_bytes()
     try:
         return read(data)

@@ -208,7 +208,7 @@ def test_the_script_around_a_program_with_formats_of_its_own(page, small, tmp_pa
     mytool.chmod(0o755)
     monkeypatch.setenv("PATH", str(mytool.parent), prepend=":")
     words = f"sh {tmp_path / 'mine.sh'} {{cloud}} {{skeleton}}"
-    assert run(small, tmp_path / "mine", command=words, ending=".cgal").failures == {}
+    assert run(small, tmp_path / "mine", command=words, ending=".obj").failures == {}
     cloud = small.scored[0]
-    found = read_skeleton(tmp_path / "mine" / f"{cloud.name}.cgal").vertices
+    found = read_skeleton(tmp_path / "mine" / f"{cloud.name}.obj").vertices
     np.testing.assert_allclose(found, np.asarray(read_cloud(cloud.path).points)[[0, -1]], atol=1e-6)

@@ -47,7 +47,7 @@ def test_numbers_of_a_cloud(told, tmp_path, write_scan):
 
 @pytest.fixture
 def skeleton(invoke, scans, tmp_path):
-    names = ("s.json", "s.npz", "s.ply", "s.obj", "s.swc", "s.graphml", "s.cgal")
+    names = ("s.json", "s.npz", "s.ply", "s.obj", "s.swc")
     words = [word for name in names for word in ("-o", name)]
     result = invoke("skeletonize", scans / "sample.ply", *words, "--cut-loops", "--set", "Connector.radius=4%")
     assert result.exit_code == 0

@@ -25,7 +25,7 @@ TABLE = """
     2 convert y.ply a.ply --root x                         | for others use 'glsk edit'
     2 rig y.ply                                            | nothing to write: give one output with -o
     2 rig y.ply -o a.glb -o b.glb                          | rig writes one file: give one output with -o
-    2 rig none.ply -o r.fbx                                | r.fbx: the rig is glTF or BVH and its name ends in .glb
+    2 rig none.ply -o r.fbx                                | r.fbx: the rig is glTF and its name ends in .glb
     1 rig y.ply y.ply -o r.glb                             | y.ply: is a skeleton, not a scan
     1 rig y.ply junk.ply -o r.glb                          | junk.ply: not a valid .ply file: it does not start with
     1 rig y.ply nan.xyz -o r.glb                           | nan.xyz: the surface has points that are not finite: drop

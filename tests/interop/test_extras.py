@@ -20,7 +20,7 @@ from glsk_o3d.samples import y_junction
 points = y_junction(600).points
 skeleton = glsk.skeletonize(points)
 from glsk_o3d.io.skeletons import FORMATS, READABLE
-for ending in FORMATS.keys() - {".graphml"}:
+for ending in FORMATS:
     glsk.save_skeleton(skeleton, f"s{ending}", cut_loops=True)
     if ending in READABLE:
         glsk.read_skeleton(f"s{ending}")
@@ -37,13 +37,10 @@ from pathlib import Path
 from glsk_o3d.crosscheck import cross_check
 for ending in ("las", "laz", "e57"):
     Path(f"scan.{ending}").write_bytes(b"any")
-Path("s.graphml").write_bytes(b"<graphml/>")
 asking = {
     "preview": lambda: glsk.save_preview(skeleton, "s.png"),
     "report": lambda: glsk.save_report(skeleton, "s.html"),
     "graph": skeleton.to_networkx,
-    "graphml": lambda: glsk.save_skeleton(skeleton, "s.graphml"),
-    "read graphml": lambda: glsk.read_skeleton("s.graphml"),
     "plot": lambda: glsk.plot_skeleton(skeleton),
     "colours": lambda: glsk.to_line_set(skeleton, "branch"),
     "crosscheck": lambda: cross_check(points),
@@ -64,9 +61,8 @@ print(json.dumps(said))
 """
 NAMED = {
     **dict.fromkeys(("preview", "report", "plot", "colours", "notebook", "batch"), "pictures"),
-    **dict.fromkeys(("graph", "graphml", "read graphml"), "graph"),
     **{"las": "las", "laz": "las", "e57": "e57"},
-    **{name: name for name in ("crosscheck", "meshlab", "cluster")},
+    **{name: name for name in ("graph", "crosscheck", "meshlab", "cluster")},
 }
 
 
