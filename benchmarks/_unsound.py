@@ -224,14 +224,13 @@ USES: tuple[Callable[[Skeleton, Path], object], ...] = (
     lambda it, _: it.to_line_set(),
     *(
         lambda it, _, color=color: glsk.to_line_set(it, color)
-        for color in ("branch", "order", "radius", "confidence", "support", "thickness")
+        for color in ("branch", "order", "radius", "confidence", "support")
     ),
-    lambda it, _: glsk.to_tensor_line_set(it, "radius"),
     lambda it, _: glsk.to_tubes(it),
     lambda it, _: glsk.to_tubes(it, radius=0.1),
     lambda it, _: glsk.to_pymeshlab(it),
     lambda it, _: glsk.annotate(it, color="branch"),
-    lambda it, _: glsk.annotate(it, np.random.default_rng(0).normal(size=(20, 3)), color="thickness"),
+    lambda it, _: glsk.annotate(it, np.random.default_rng(0).normal(size=(20, 3)), color="radius"),
     lambda it, folder: (str(table := analysis.branch_table(it)), table.to_csv(folder / "t.csv")),
     *(lambda it, _, root=root: analysis.branch_table(it, root) for root in ("z", "thickest", 0, (0, 0, 0))),
     lambda it, _: analysis.segment(it),

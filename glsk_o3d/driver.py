@@ -10,7 +10,7 @@ import numpy as np
 
 from .contractor import Contractor, Reducer
 from .errors import InvalidCloudError, InvalidParameterError
-from .interop.clouds import SearchParam, open3d_class
+from .interop.clouds import open3d_class
 from .interop.packages import import_open3d
 from .lpr_reducer import LPRReducer
 from .parameters import check_number
@@ -40,7 +40,7 @@ class Options(TypedDict, total=False):
     denoise: int
     around: float
     thin_to: int | Literal["auto", "all"]
-    k: int | Literal["auto", "published"] | SearchParam
+    k: int | Literal["auto", "published"]
     reducer: Reducer | None
     stop: StopRule
     max_iterations: int

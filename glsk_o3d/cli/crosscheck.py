@@ -48,9 +48,8 @@ def crosscheck(
 
 
 def _save_angles(check: Any, path: Path) -> None:
-    from ..interop.packages import import_open3d
-    from ..io.scans import save_tensor_cloud
+    from ..interop.atomic import write_atomically
+    from ..io.formats import ply
 
-    marked = import_open3d().t.geometry.PointCloud(check.points)
-    marked.point.angle = check.angle[:, None]
-    save_tensor_cloud(marked, path)
+    data = ply.content(ply.columns_of({"positions": check.points, "angle": check.angle}))
+    write_atomically(path, lambda temporary: temporary.write_bytes(data))

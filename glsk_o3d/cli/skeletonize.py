@@ -52,8 +52,7 @@ def skeletonize(
     from .. import ContractionRecorder, annotate_file, read_cloud, recipes, save_mesh, to_tubes
     from ..interop.packages import require
     from ..io.meshes import WRITTEN_MESH_ENDINGS
-    from ..io.scans import WRITTEN_CLOUD_ENDING
-    from ..io.streaming import sample_for
+    from ..io.streaming import LABELLED_ENDING, sample_for
     from ..resampling import with_support
     from .overrides import choose, grown_from
 
@@ -68,7 +67,7 @@ def skeletonize(
     results = [
         *skeleton_outputs(output, preview, report, title=scan.name, cut_loops=cut_loops, recorder=recorder),
         Output(tubes, WRITTEN_MESH_ENDINGS, "tubes are a mesh", lambda it, path: save_mesh(to_tubes(it), path)),
-        Output(labelled, (WRITTEN_CLOUD_ENDING,), "cloud with labels is PLY", label),
+        Output(labelled, (LABELLED_ENDING,), "cloud with labels is PLY", label),
     ]
     if all(result.path is None for result in results):
         raise WrongUsage("nothing to write: give -o, --tubes or --labelled, a --preview or a --report")
@@ -102,19 +101,21 @@ def demo(
     It is a toy dinosaur with a carrying handle on its back, scanned from two sides. Writes cloud.ply (the scan),
     skeleton.ply, skeleton.json and skeleton.png (the picture to look at).
     """
-    from .. import MissingPackageError, samples, save_tensor_cloud
-    from ..interop.packages import import_open3d, require_for
+    from .. import MissingPackageError, samples
+    from ..interop.atomic import write_atomically
+    from ..interop.packages import require_for
+    from ..io.formats import ply
 
     if folder.exists() and not folder.is_dir():
         raise NotADirectoryError(f"{folder}: is a file, not a folder")
     folder.mkdir(parents=True, exist_ok=True)
-    o3d, picture, missing = import_open3d(), folder / "skeleton.png", ""
+    picture, missing = folder / "skeleton.png", ""
     try:
         require_for(picture.suffix)
     except MissingPackageError as error:  # all else can be shown
         missing = f"no {picture.name}: {error}"
-    cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(samples.sample_object(points).points))
-    save_tensor_cloud(cloud, folder / "cloud.ply")
+    data = ply.content(ply.columns_of({"positions": samples.sample_object(points).points}))
+    write_atomically(folder / "cloud.ply", lambda temporary: temporary.write_bytes(data))
     if not (flags.quiet or flags.as_json):
         echo(f"wrote {folder / 'cloud.ply'}")
     outputs = [folder / "skeleton.ply", folder / "skeleton.json"]

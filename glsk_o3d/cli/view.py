@@ -3,53 +3,35 @@
 from pathlib import Path
 from typing import Annotated
 
-from ..errors import did_you_mean
 from .options import argument, option
 from .outputs import check_outputs, skeleton_outputs, tell, write_each
-from .reporting import WrongUsage
-
-LABELS = ("branch", "label", "classification")
-"""Attributes that are shown where a cloud has no colours: of several the first."""
 
 
 def view(
     file: Annotated[Path, argument("SKELETON|SCAN", "In any format that is read or written; see 'glsk info'.")],
     preview: Annotated[Path | None, option("PNG", "Open no window: draw a picture.")] = None,
     report: Annotated[Path | None, option("HTML", "Open no window: write a page for the browser.")] = None,
-    color: Annotated[str | None, option("ATTRIBUTE", "In the window, colour the points of a scan by it.")] = None,
 ) -> None:
     """Look at a skeleton or a scan in a window.
 
     That needs a display; --preview and --report make files instead. In the window, C, S and T show and hide the cloud,
-    the skeleton, and its tubes of true radius; H helps, Q closes. A scan has its colours there, or else those of its
-    labels, in turn as those of branches; in files it is grey. Measures go from dark blue to yellow.
+    the skeleton, and its tubes of true radius; H helps, Q closes. A scan has its colours there, and is grey in
+    files.
     """
-    from dataclasses import replace
-
     import numpy as np
 
     from .. import Skeleton, read_skeleton
-    from ..io.colors import attribute_shades
     from ..io.scans import read_scan
     from ..io.skeletons import holds_skeleton
     from ..viewing.window import show
 
     outputs = skeleton_outputs([], preview, report, title=file.name)
     check_outputs(outputs, file)
-    if color is not None and (preview or report):
-        raise WrongUsage("--color is for the window: in pictures and pages points are grey")
     cloud = None
     if holds_skeleton(file):
-        if color is not None:
-            raise WrongUsage(f"{file}: is a skeleton: --color is for scans")
         skeleton = read_skeleton(file)
     else:
         scan = read_scan(file)
-        if color is not None and color not in scan.given:
-            raise WrongUsage(f"{file}: {did_you_mean(color, scan.given, 'attribute of its points')}")
-        shown = color or next((name for name in LABELS if name in scan.given and scan.colors is None), None)
-        if shown is not None:
-            scan = replace(scan, colors=attribute_shades(scan.given[shown]))
         cloud, none, n = scan.to_legacy(), np.empty(0), len(scan.positions)
         skeleton = Skeleton(none, none, none, np.full(n, -1), scan.positions, np.full((n, 3), np.nan))
     if preview is None and report is None:

@@ -9,7 +9,7 @@ from ..analysis.segmentation import branch_of_point, thickness_of_points, vertex
 from ..interop.clouds import open3d_class
 from ..interop.packages import import_open3d
 from ..skeleton import Skeleton
-from .colors import ColorChoice, shades, thickness_shades
+from .colors import ColorChoice, shades
 
 
 def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None = None) -> Any:
@@ -32,7 +32,7 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
     cloud : cloud, optional
         By default that of the skeleton. Points of another cloud have the attributes of its nearest point, or of the
         nearest place on the curve if the skeleton's file held no cloud.
-    color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1], optional
+    color : {"branch", "order", "radius", "confidence", "support"} or three floats in [0, 1], optional
         What the colours of the points show, or the one colour of all.
 
     Returns
@@ -91,7 +91,5 @@ def labels(
         found[name] = np.where(vertex >= 0, values[vertex], np.nan)
     found["thickness"] = thickness
     if color is not None:
-        thick = isinstance(color, str) and color == "thickness"  # of these points, not of those of the skeleton
-        colors = thickness_shades(thickness) if thick else shades(skeleton, color, branch, vertex)
-        found["colors"] = np.round(255 * colors).astype(np.uint8)
+        found["colors"] = np.round(255 * shades(skeleton, color, branch, vertex)).astype(np.uint8)
     return found

@@ -6,19 +6,14 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from ..analysis.branches import branch_table
-from ..analysis.segmentation import thickness_of_points
 from ..interop.packages import require
-from ..numerics.groups import group_median
 from ..skeleton import Skeleton, as_color
 
-ColorChoice: TypeAlias = Literal["branch", "order", "radius", "confidence", "support", "thickness"] | Sequence[float]
+ColorChoice: TypeAlias = Literal["branch", "order", "radius", "confidence", "support"] | Sequence[float]
 """What colours show, or one colour for all: red, green and blue from 0 to 1."""
 
 UNKNOWN_GREY = (0.6, 0.6, 0.6)
-COLOR_NAMES = ("branch", "order", "radius", "confidence", "support", "thickness")
-MOST_LABELS = 1000  # fitted: different whole numbers; intensities are mostly more, branches and trees fewer
-OUTERMOST = 0.02  # fitted: of the points, at either end of a measure
-THICKNESS_SPAN = 4.0  # fitted: that of the last colour; of the first it is one over that
+COLOR_NAMES = ("branch", "order", "radius", "confidence", "support")
 
 
 def shades(skeleton: Skeleton, color: ColorChoice, branch: np.ndarray, vertices: np.ndarray) -> np.ndarray:
@@ -26,8 +21,7 @@ def shades(skeleton: Skeleton, color: ColorChoice, branch: np.ndarray, vertices:
 
     Branches have 18 colours in turn. All else goes from dark blue to yellow: orders of the branches, as in the table of
     them, from 0 to the highest of the skeleton; radii from the least to the largest; confidences and support from 0 to
-    1; the median thickness of the points of a vertex from a quarter to four, 1 in the middle. Each thing has the mean
-    of its vertices; where `branch` or one of `vertices` is -1, it is grey.
+    1. Each thing has the mean of its vertices; where `branch` or one of `vertices` is -1, it is grey.
     """
     if not isinstance(color, str) or color not in COLOR_NAMES:
         return np.tile(as_color(color, f"must be one of {COLOR_NAMES} or three numbers from 0 to 1"), (len(branch), 1))
@@ -39,25 +33,6 @@ def shades(skeleton: Skeleton, color: ColorChoice, branch: np.ndarray, vertices:
     vertices = vertices if vertices.ndim == 2 else vertices[:, None]
     values = _of_vertices(skeleton, color)
     return _ramp(np.where((vertices >= 0).all(axis=1), values[vertices].mean(axis=1), np.nan))
-
-
-def attribute_shades(values: np.ndarray) -> np.ndarray:
-    """Colours of what a file says of points, (n,) array: whole numbers are labels and have those of branches.
-
-    So many labels that they are rather measures, and all other numbers, go from dark blue to yellow, but for the
-    `OUTERMOST` at either end, which may be far out. What is negative among labels, or no number, is grey.
-    """
-    labels = values.astype(int) if values.dtype.kind in "iub" else None
-    if labels is not None and len(np.unique(labels)) <= MOST_LABELS:
-        return _in_turn(labels)
-    known = values[np.isfinite(values)].astype(float)
-    low, high = np.quantile(known, [OUTERMOST, 1 - OUTERMOST]) if len(known) else (0.0, 1.0)
-    return _ramp(np.where(np.isfinite(values), np.clip((values - low) / ((high - low) or 1.0), 0, 1), np.nan))
-
-
-def thickness_shades(thickness: np.ndarray) -> np.ndarray:
-    """Colours of thicknesses, (n,) float array, as `shades` has them; NaN is grey."""
-    return _ramp(_thickness_share(thickness))
 
 
 def _in_turn(labels: np.ndarray) -> np.ndarray:
@@ -79,22 +54,4 @@ def _of_vertices(skeleton: Skeleton, color: str) -> np.ndarray:
         radii = skeleton.radii
         low, high = np.nanmin(radii, initial=np.inf), np.nanmax(radii, initial=-np.inf)
         return (radii - low) / (high - low) if high > low else np.where(np.isnan(radii), np.nan, 0)
-    if color == "thickness":
-        return _thickness_share(_median_thickness(skeleton))
     return skeleton.confidence if color == "confidence" else skeleton.support
-
-
-def _thickness_share(thickness: np.ndarray) -> np.ndarray:
-    with np.errstate(divide="ignore"):
-        return np.clip(np.log(thickness) / np.log(THICKNESS_SPAN) / 2 + 0.5, 0, 1)
-
-
-def _median_thickness(skeleton: Skeleton) -> np.ndarray:
-    owned = np.flatnonzero(skeleton.vertex_of_point >= 0)
-    found, count = np.full(len(skeleton.vertices), np.nan), len(skeleton.vertices)
-    if len(owned):
-        vertex = skeleton.vertex_of_point[owned]
-        values = thickness_of_points(skeleton, skeleton.points, skeleton.vertex_of_point)[owned]
-        some = np.bincount(vertex, minlength=count) > 0
-        found[some] = group_median(values, vertex, count)[some]
-    return found

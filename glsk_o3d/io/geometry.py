@@ -11,7 +11,7 @@ from ..interop.packages import import_open3d
 from ..numerics.neighbourhoods import plane_axes
 from ..numerics.vectors import TINY, dot, unit
 from ..refinement.sections import measure_sections
-from ..skeleton import OF_VERTICES, Skeleton
+from ..skeleton import Skeleton
 from .colors import ColorChoice, shades
 
 
@@ -21,7 +21,7 @@ def to_line_set(skeleton: Skeleton, color: ColorChoice = "branch") -> Any:
     Parameters
     ----------
     skeleton : Skeleton
-    color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1]
+    color : {"branch", "order", "radius", "confidence", "support"} or three floats in [0, 1]
         What the colours of the edges show, or the one colour of all.
 
     Returns
@@ -46,43 +46,6 @@ def to_line_set(skeleton: Skeleton, color: ColorChoice = "branch") -> Any:
     return lines
 
 
-def to_tensor_line_set(skeleton: Skeleton, color: ColorChoice | None = None) -> Any:
-    """A skeleton as a tensor line set on the CPU, with all attributes of vertices and edges.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-    color : as of `to_line_set`, optional
-
-    Returns
-    -------
-    open3d.t.geometry.LineSet
-        With ``point.radius``, ``point.confidence``, ``point.half_width``, ``point.half_thickness`` and
-        ``point.support`` (M, 1) float64, ``line.branch`` (E, 1) int32 and, with a color, ``line.colors``.
-
-    Raises
-    ------
-    InvalidParameterError, MissingPackageError
-
-    Examples
-    --------
-    >>> from glsk_o3d import skeletonize
-    >>> from glsk_o3d.samples import torus
-    >>> ring = skeletonize(torus(1000).points)
-    >>> to_tensor_line_set(ring).line.branch.shape[0] == len(ring.edges)
-    True
-    """
-    o3d, branch = import_open3d(), branch_of_edge(skeleton)
-    lines = o3d.t.geometry.LineSet(o3d.core.Tensor(skeleton.vertices), o3d.core.Tensor(skeleton.edges))
-    for name, field in zip(("radius", *OF_VERTICES[1:]), OF_VERTICES, strict=True):
-        lines.point[name] = o3d.core.Tensor(getattr(skeleton, field)[:, None])
-    lines.line["branch"] = o3d.core.Tensor(branch.astype(np.int32)[:, None])
-    if color is not None:
-        shown = shades(skeleton, color, branch, skeleton.edges)
-        lines.line["colors"] = o3d.core.Tensor(np.ascontiguousarray(shown).reshape(-1, 3))
-    return lines
-
-
 def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float | None = None, sides: int = 16) -> Any:
     """A skeleton as a mesh of tubes, one for every branch, closed by half balls.
 
@@ -94,7 +57,7 @@ def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float
     ----------
     skeleton : Skeleton
         A vertex without edges becomes a ball.
-    color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1]
+    color : {"branch", "order", "radius", "confidence", "support"} or three floats in [0, 1]
         What the colours of the branches or vertices show, or the one colour of all.
     radius : float, optional
         One radius for all, in the cloud's units, instead of the sections of the vertices.

@@ -1,4 +1,4 @@
-"""Scans from files, clouds and meshes of which the vertices are taken, whole or in blocks; and clouds to files."""
+"""Scans from files, clouds and meshes of which the vertices are taken, whole or in blocks."""
 
 import errno
 import logging
@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileFormatError, InvalidCloudError, MissingPackageError, brief
-from ..interop.atomic import check_ending, write_atomically
 from ..interop.packages import import_open3d
 from . import meshes
 from .formats import pcd, ply, scanners, text_tables
@@ -19,7 +18,6 @@ from .paths import MESH_ENDINGS, SCAN_ENDINGS, TEXT_ENDINGS, existing_file, unkn
 from .scan import ALL_ROWS, NoPoints, Scan, parsed
 from .skeletons import holds_skeleton
 
-WRITTEN_CLOUD_ENDING = ".ply"
 BLOCK_ROWS = 1_000_000  # measured: larger blocks are not read faster, and take more memory
 _log = logging.getLogger(__name__)
 
@@ -226,33 +224,3 @@ def _chosen(path: Path, blocks: Iterator[Scan], where: str | None) -> Iterator[S
         raise FileFormatError(f"{path}: no points could be read: it is empty, damaged, or not a {ending} file")
     if not chosen:
         raise InvalidCloudError(f"there is no point with {where}")
-
-
-def save_tensor_cloud(cloud: Any, path: str | os.PathLike) -> None:
-    """Write a tensor cloud with all its attributes and all digits, as PLY, which Open3D and `read_tensor_cloud` read.
-
-    Colours become bytes, integers int32 or else doubles, and an attribute of several columns as many properties.
-
-    Parameters
-    ----------
-    cloud : open3d.t.geometry.PointCloud
-    path : path-like
-        Ends in ``.ply``; it appears complete or not at all.
-
-    Raises
-    ------
-    FileFormatError
-        The ending is another.
-    OSError
-        The folder does not exist, or the file cannot be written.
-
-    Examples
-    --------
-    >>> from tempfile import TemporaryDirectory
-    >>> cloud = import_open3d().t.geometry.PointCloud(np.eye(3))
-    >>> with TemporaryDirectory() as folder:
-    ...     save_tensor_cloud(cloud, f"{folder}/cloud.ply")
-    """
-    check_ending(path, "cloud with labels is PLY", WRITTEN_CLOUD_ENDING)
-    data = ply.content(ply.columns_of({name: cloud.point[name].cpu().numpy() for name in cloud.point}))
-    write_atomically(path, lambda temporary: temporary.write_bytes(data))

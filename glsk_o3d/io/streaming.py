@@ -20,8 +20,9 @@ from ..skeleton import Skeleton
 from .annotation import labels
 from .formats import ply
 from .scan import COLOR_CHANNELS, Scan
-from .scans import WRITTEN_CLOUD_ENDING, promised_points, read_blocks
+from .scans import promised_points, read_blocks
 
+LABELLED_ENDING = ".ply"
 LARGE_CLOUD = 10_000_000  # measured: points that in memory take 2 GB, and in blocks half the time
 
 
@@ -172,7 +173,7 @@ def annotate_file(
     ...     annotate_file(skeletonize(torus(1000).points), f"{folder}/scan.xyz", f"{folder}/marked.ply")
     3000
     """
-    check_ending(output, "cloud with labels is PLY", WRITTEN_CLOUD_ENDING)
+    check_ending(output, "cloud with labels is PLY", LABELLED_ENDING)
     if Path(output).exists() and Path(path).exists() and os.path.samefile(path, output):
         raise FileFormatError(f"{os.fspath(output)}: is the scan itself: give another name")
     label = _labeller(skeleton)

@@ -43,7 +43,7 @@ def plot_skeleton(
         By default new ones in a new figure.
     cloud : cloud, optional
         Anything that carries points, instead of the skeleton's own.
-    color : {"branch", "order", "radius", "confidence", "support", "thickness"} or three floats in [0, 1]
+    color : {"branch", "order", "radius", "confidence", "support"} or three floats in [0, 1]
         Of the edges, as for `glsk_o3d.to_line_set`.
     point_colors : (N, 3) float array, optional
         Red, green and blue of the cloud's points from 0 to 1, instead of greys.

@@ -9,7 +9,7 @@ import numpy as np
 import open3d as o3d
 import pytest
 
-from glsk_o3d import Decision, read_skeleton, save_skeleton, save_tensor_cloud
+from glsk_o3d import Decision, read_skeleton, save_skeleton
 from glsk_o3d.io import streaming
 from glsk_o3d.io.scans import read_blocks
 
@@ -123,7 +123,7 @@ def test_a_large_cloud_is_told_block_by_block(told, tmp_path, monkeypatch):
     cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(places))
     cloud.point.label = o3d.core.Tensor(random.integers(0, 9, (500, 1)).astype(np.int32))
     cloud.point.time = o3d.core.Tensor(random.random((500, 1)))
-    save_tensor_cloud(cloud, tmp_path / "c.ply")
+    o3d.t.io.write_point_cloud(str(tmp_path / "c.ply"), cloud)
     whole = told(tmp_path / "c.ply")
     monkeypatch.setattr(streaming, "LARGE_CLOUD", 499)
     monkeypatch.setitem(read_blocks.__kwdefaults__, "rows", 60)
@@ -152,30 +152,14 @@ def test_without_a_display_it_names_what_else_there_is(glsk, monkeypatch, y):
     assert run.stderr.count("\n") == 1
 
 
-def test_a_window_shows_a_skeleton_or_a_scan_and_its_labels_in_colour(invoke, scans, tmp_path, y, shown):
-    (tmp_path / "c.csv").write_text("x,y,z,label\n0,0,0,1\n0,0,1,2\n0,1,1,2\n1,1,1,-1\n")
-    for file in (y, scans / "sample.ply", "c.csv"):
+def test_a_window_shows_a_skeleton_or_a_scan(invoke, scans, tmp_path, y, shown):
+    for file in (y, scans / "sample.ply"):
         assert invoke("view", file).exit_code == 0
-    (skeleton, none, options), (empty, cloud, _), (_, labelled, _) = shown
+    (skeleton, none, options), (empty, cloud, _) = shown
     assert none is None
     assert repr(skeleton) == repr(read_skeleton(tmp_path / y))
     assert options == {"title": "y.ply"}
     assert (len(empty.vertices), len(cloud.points), len(empty.points)) == (0, 1100, 1100)
-    colours = np.asarray(labelled.colors)
-    assert len(np.unique(colours, axis=0)) == 3
-    assert (colours[1] == colours[2]).all()
-
-
-def test_points_are_coloured_by_the_attribute_that_is_asked_for(invoke, refused, tmp_path, y, shown):
-    (tmp_path / "c.csv").write_text("x,y,z,label,angle\n0,0,0,1,0\n0,0,1,2,5\n0,1,1,2,9\n1,1,1,-1,nan\n")
-    assert invoke("view", "c.csv", "--color", "angle").exit_code == 0
-    colours = np.asarray(shown.pop()[1].colors)
-    assert colours[0, 2] > colours[0, 0]  # dark blue
-    assert colours[2, 0] > 0.9 > colours[2, 2]  # yellow
-    assert np.ptp(colours[3]) < 0.1 < np.ptp(colours[1])  # grey is what is no number
-    assert "did you mean 'label'" in refused(2, "view", "c.csv", "--color", "lable")
-    assert "--color is for scans" in refused(2, "view", y, "--color", "branch")
-    assert "--color is for the window" in refused(2, "view", "c.csv", "--color", "angle", "--preview", "p.png")
 
 
 def test_files_instead_of_a_window(invoke, scans, shown, tmp_path, y):

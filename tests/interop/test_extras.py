@@ -26,7 +26,7 @@ for ending in FORMATS:
         glsk.read_skeleton(f"s{ending}")
 glsk.save_recipe(glsk.pipelines.default(), "r.toml")
 assert glsk.load_recipe("r.toml") == glsk.pipelines.default()
-skeleton.to_line_set(), glsk.to_tensor_line_set(skeleton), glsk.to_tubes(skeleton, (1, 0, 0))
+skeleton.to_line_set(), glsk.to_tubes(skeleton, (1, 0, 0))
 glsk.annotate(skeleton, points, color=(1, 0, 0))
 table = glsk.analysis.branch_table(skeleton)
 table.to_csv("branches.csv"), str(table), glsk.analysis.grasp_candidates(skeleton, 1.0)

@@ -7,7 +7,6 @@ import pytest
 import glsk_o3d as glsk
 from glsk_o3d import InvalidParameterError, annotate, samples
 from glsk_o3d.analysis import branch_table, segment
-from glsk_o3d.io.colors import thickness_shades
 
 POINTS = samples.y_junction(800).points
 RNG = np.random.default_rng(1)
@@ -98,8 +97,5 @@ def test_colours(cloud, skeleton):
     brightness = annotate(skeleton, cloud, color="radius").point.colors.numpy() @ [0.2, 0.7, 0.1]
     radius = skeleton.radii[skeleton.vertex_of_point]
     assert brightness[radius.argmin()] < brightness[radius.argmax()]
-    marked = annotate(skeleton, cloud, color="thickness").point
-    expected = np.round(255 * thickness_shades(marked.thickness.numpy()[:, 0].astype(float)))
-    assert np.abs(marked.colors.numpy() - expected).max() <= 1
     with pytest.raises(InvalidParameterError, match="color"):
         annotate(skeleton, cloud, color="size")

@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from glsk_o3d import samples, skeletonize
 from glsk_o3d.analysis import branch_table
-from glsk_o3d.analysis.segmentation import thickness_of_points
 from glsk_o3d.errors import InvalidParameterError
-from glsk_o3d.io.colors import COLOR_NAMES, UNKNOWN_GREY, shades, thickness_shades
+from glsk_o3d.io.colors import COLOR_NAMES, UNKNOWN_GREY, shades
 
 BRANCH, VERTICES = np.array([0, 1, -1]), np.array([0, 5, -1])
 
@@ -30,19 +28,6 @@ def test_branches_differ_orders_go_up_and_values_are_means_over_vertices(tree):
     dark, light = (np.unique(shown[order == each], axis=0) for each in (0, 1))
     assert len(dark) == len(light) == 1
     assert dark.sum() < light.sum()
-
-
-def test_thickness_is_teal_where_it_is_one_and_of_a_vertex_the_median_of_its_points():
-    shown = thickness_shades(np.array([0.0, 0.25, 1.0, 4.0, np.inf, np.nan]))
-    np.testing.assert_array_equal(shown[[0, 4, 5]], [shown[1], shown[3], UNKNOWN_GREY])
-    np.testing.assert_allclose(shown[2], [0.128, 0.567, 0.551], atol=0.01)
-    skeleton = skeletonize(samples.torus(500).points)
-    of_points = thickness_of_points(skeleton, skeleton.points, skeleton.vertex_of_point)
-    count = np.bincount(skeleton.vertex_of_point)
-    vertex = int(np.argmax(count % 2))
-    median = np.median(of_points[skeleton.vertex_of_point == vertex])
-    shown = shades(skeleton, "thickness", np.zeros(1, int), np.array([vertex]))
-    np.testing.assert_allclose(shown, thickness_shades(np.array([median])), atol=1e-9)
 
 
 def test_one_colour_for_all_and_what_is_none(tree):

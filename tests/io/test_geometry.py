@@ -3,14 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
-import open3d as o3d
 import pytest
 
-from glsk_o3d import InvalidParameterError, Skeleton, samples, skeletonize, to_line_set, to_tensor_line_set, to_tubes
+from glsk_o3d import InvalidParameterError, Skeleton, samples, skeletonize, to_line_set, to_tubes
 from glsk_o3d.io.colors import COLOR_NAMES
 from glsk_o3d.io.geometry import sweep
 from glsk_o3d.refinement.sections import measure_sections
-from glsk_o3d.skeleton import OF_VERTICES
 
 
 def graph(vertices, edges, radii):
@@ -39,7 +37,6 @@ def test_in_colour_without_edges(count, color):
     lone = Skeleton(np.zeros((count, 3)), (), np.ones(count), (), (), (), confidence=np.ones(count))
     lines = to_line_set(lone, color)
     assert (len(lines.points), len(lines.lines), len(lines.colors)) == (count, 0, 0)
-    assert to_tensor_line_set(lone, color).line.colors.shape == (0, 3)
     assert len(to_tubes(lone, color).vertex_colors) == len(to_tubes(lone, color).vertices)
 
 
@@ -50,27 +47,8 @@ def test_line_sets_in_colour():
         count = len(np.unique(legacy, axis=0))
         assert count == distinct if distinct else count > 5
     bare = graph(branched.vertices, branched.edges, np.full(len(branched.radii), np.nan))
-    for color in ("radius", "confidence", "thickness"):
+    for color in ("radius", "confidence"):
         assert (np.asarray(to_line_set(bare, color).colors) == 0.6).all()
-
-
-def test_a_tensor_line_set_has_all_attributes():
-    branched = skeletonize(samples.y_junction(800).points)
-    lines = to_tensor_line_set(branched)
-    assert isinstance(lines, o3d.t.geometry.LineSet)
-    expected = {"positions": branched.vertices, "radius": branched.radii[:, None]}
-    expected |= {name: getattr(branched, name)[:, None] for name in OF_VERTICES[1:]}
-    assert set(lines.point) == expected.keys()
-    for name, values in expected.items():
-        assert lines.point[name].dtype == o3d.core.float64
-        np.testing.assert_array_equal(lines.point[name].numpy(), values)
-    np.testing.assert_array_equal(lines.line.indices.numpy(), branched.edges)
-    for path, branch in zip(branched.branches, range(3), strict=True):
-        assert (lines.line.branch.numpy()[np.isin(branched.edges, path).all(axis=1)] == branch).all()
-    assert "colors" not in lines.line
-    for color in ("branch", "radius", (0.1, 0.2, 0.3)):
-        shown = to_tensor_line_set(branched, color).line.colors.numpy()
-        np.testing.assert_array_equal(shown, np.asarray(to_line_set(branched, color).colors))
 
 
 # --------------------------------------------------------------------------------------------------------------- tubes

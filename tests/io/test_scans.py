@@ -10,7 +10,7 @@ from glsk_o3d import save_skeleton
 from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from glsk_o3d.io.formats.text_tables import holds_points
 from glsk_o3d.io.paths import CLOUD_ENDINGS, MESH_ENDINGS
-from glsk_o3d.io.scans import promised_points, read_blocks, read_cloud, read_scan, read_tensor_cloud, save_tensor_cloud
+from glsk_o3d.io.scans import promised_points, read_blocks, read_cloud, read_scan
 from glsk_o3d.io.skeletons import READABLE, read_skeleton, read_truth
 
 
@@ -24,48 +24,6 @@ def test_clouds_that_open3d_writes(cloud, xyz, tmp_path, name, options):
     np.testing.assert_allclose(np.asarray(back.points), xyz, rtol=1e-5)  # six digits in text
     assert back.has_normals() == (kind in ("ply", "pcd", "xyzn"))
     assert back.has_colors() == (kind in ("ply", "pcd", "xyzrgb", "pts"))
-
-
-@pytest.mark.parametrize("name", ["c.ply", "C.PLY"])
-@pytest.mark.parametrize("normals", [np.float64, np.float32])
-def test_tensor_clouds_come_back_as_they_were(tmp_path, capfd, name, normals):
-    rng = np.random.default_rng(0)
-    held = {
-        "positions": rng.random((50, 3)) + [471234.5, 5612345.6, 123.4],
-        "normals": rng.normal(size=(50, 3)).astype(normals),
-        "colors": rng.integers(0, 256, (50, 3)).astype(np.uint8),
-        "classification": rng.integers(0, 9, (50, 1)).astype(np.int32),
-        "intensity": rng.random((50, 1)).astype(np.float32),
-        "gps_time": 1e9 * rng.random((50, 1)),
-    }
-    cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(held["positions"]))
-    for key, values in held.items():
-        cloud.point[key] = o3d.core.Tensor(values)
-    save_tensor_cloud(cloud, tmp_path / name)
-    assert capfd.readouterr() == ("", "")
-    path = str(tmp_path / name)
-    for back in (o3d.t.io.read_point_cloud(path), read_tensor_cloud(path)):
-        assert {*back.point} == held.keys()
-        for key, values in held.items():
-            assert key == "normals" or back.point[key].numpy().dtype == values.dtype
-            np.testing.assert_array_equal(back.point[key].numpy(), values, err_msg=key)
-
-
-def test_attributes_that_ply_does_not_hold(tmp_path):
-    cloud = o3d.t.geometry.PointCloud(np.eye(3))
-    for name, values in (("place", np.eye(3)), ("id", np.array([[1], [2], [2**40]])), ("seen", np.eye(3)[:, :1] > 0)):
-        cloud.point[name] = o3d.core.Tensor(values)
-    cloud.point.colors = o3d.core.Tensor(np.eye(3))
-    save_tensor_cloud(cloud, tmp_path / "c.ply")
-    back = read_tensor_cloud(tmp_path / "c.ply").point
-    assert {name: back[name].numpy().ravel().tolist() for name in ("place_1", "id", "seen")} == {
-        "place_1": [0, 1, 0],
-        "id": [1, 2, 2**40],
-        "seen": [1, 0, 0],
-    }
-    np.testing.assert_array_equal(back.colors.numpy(), 255 * np.eye(3))
-    with pytest.raises(FileFormatError, match=r"c\.xyz: the cloud with labels is PLY"):
-        save_tensor_cloud(cloud, tmp_path / "c.xyz")
 
 
 # -------------------------------------------------------------------------------------------------------- what is none

@@ -15,7 +15,6 @@ from glsk_o3d import (
     read_skeleton,
     read_tensor_cloud,
     save_skeleton,
-    save_tensor_cloud,
     skeletonize,
 )
 from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
@@ -164,7 +163,7 @@ def test_labels_are_those_of_annotate(scans, skeleton, tmp_path, ending, where):
 
 def test_thickness_is_that_of_the_points_of_the_skeleton_and_not_known_without(ring, tmp_path):
     scan, marked = tmp_path / "scan.ply", tmp_path / "marked.ply"
-    save_tensor_cloud(annotate(ring), scan)
+    assert o3d.t.io.write_point_cloud(str(scan), annotate(ring))
     annotate_file(ring, scan, marked)
     found = read_tensor_cloud(marked).point.thickness.numpy()
     np.testing.assert_array_equal(found, annotate(ring).point.thickness.numpy())
@@ -231,13 +230,14 @@ def test_a_scan_that_breaks_off_leaves_nothing_behind(scans, ring, tmp_path, end
 def test_a_scan_that_changes_meanwhile_leaves_nothing_behind(scans, ring, tmp_path, monkeypatch, change):
     cloud = read_tensor_cloud(scans / "scan.ply")
     path, survey = tmp_path / "scan.ply", streaming._survey
-    save_tensor_cloud(cloud, path)
+    o3d.t.io.write_point_cloud(str(path), cloud)
 
     def changes_then(*given):
         found = survey(*given)
         if change == "no classification":
             del cloud.point["classification"]
-        save_tensor_cloud(cloud.append(cloud) if change == "more points" else cloud.select_by_index([*range(99)]), path)
+        other = cloud.append(cloud) if change == "more points" else cloud.select_by_index([*range(99)])
+        o3d.t.io.write_point_cloud(str(path), other)
         return found
 
     monkeypatch.setattr(streaming, "_survey", changes_then)
