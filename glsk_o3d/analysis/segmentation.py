@@ -1,4 +1,4 @@
-"""What every point of a cloud belongs to: its branch, and how thick that is."""
+"""What every point of a cloud belongs to: its vertex, and its branch."""
 
 from typing import Any
 
@@ -7,9 +7,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.clouds import cloud_points
-from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.polylines import nearest_on_edges
-from ..refinement.thin_parts import SCALE_NEIGHBOUR
 from ..skeleton import Skeleton
 from .curves import along, pieces
 
@@ -130,18 +128,3 @@ def branch_of_point(skeleton, points, vertex):
         edge = nearest_on_edges(skeleton.vertices, skeleton.edges, candidates, points[rows])[0]
         label[rows] = edge_branch[edge]
     return label
-
-
-def thickness_of_points(skeleton: Skeleton, points: np.ndarray, vertex: np.ndarray) -> np.ndarray:
-    """Local radius at every point over the distance to its eighth nearest point, (N,) float array.
-
-    Well above 1 the cloud shows the surface of the part; below 1 it is thinner than the point spacing, and its radius
-    is a guess. `vertex`, (N,) int array, is that of each point, -1 for points that are not finite, which have NaN.
-    """
-    some = np.flatnonzero(vertex >= 0)
-    found = np.full(len(points), np.nan)
-    if len(some):
-        apart = nearest_neighbours(points[some], min(SCALE_NEIGHBOUR + 1, len(some)))[0][:, -1]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            found[some] = skeleton.radii[vertex[some]] / apart
-    return found

@@ -21,7 +21,6 @@ from .grid import Grid, tile_name, tile_of
 
 PARTS_FOLDER, PARTS_FILE = ".parts", "parts.json"
 MOST_PARTS = 10_000  # fitted: more things than anybody numbers in a file; fewer than a scanner's intensities
-_COUNT_WIDTH = 20  # derived: digits of the largest 64-bit number: the header is written before the count is known
 
 
 @dataclass(frozen=True)
@@ -116,7 +115,7 @@ class PartFiles:
                 stream.write(self._header(count))
 
     def _header(self, count: int) -> bytes:
-        return ply.header_of(self._row, count, width=_COUNT_WIDTH)
+        return ply.header_of(self._row, count, width=ply.COUNT_WIDTH)
 
 
 def _divided(path: Path, cut: Cut, of: list[Any], files: PartFiles) -> Split:
@@ -165,7 +164,7 @@ def _finite(scan: Scan) -> np.ndarray:
 def _values(scan: Scan, by: Any) -> np.ndarray:
     """The attribute of the points that is their label; without one it is NaN, say."""
     if by not in scan.attributes:
-        raise InvalidParameterError(did_you_mean(str(by), scan.given, "attribute of its points"))
+        raise InvalidParameterError(did_you_mean(str(by), scan.attributes, "attribute of its points"))
     return scan.attributes[by]
 
 

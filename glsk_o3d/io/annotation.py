@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from ..analysis.branches import branch_table
-from ..analysis.segmentation import branch_of_point, thickness_of_points, vertex_of_cloud
+from ..analysis.segmentation import branch_of_point, vertex_of_cloud
 from ..interop.clouds import open3d_class
 from ..interop.packages import import_open3d
 from ..skeleton import Skeleton
@@ -20,9 +20,7 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
     - ``skeleton_vertex`` (N, 1) int32: the vertex it belongs to, as in `Skeleton.vertex_of_point`;
     - ``branch`` (N, 1) int32: the row of `glsk_o3d.analysis.branch_table`, as from `glsk_o3d.analysis.segment`;
     - ``order`` (N, 1) int32: that of the branch in that table, 0 for axes at the root;
-    - ``radius`` and ``confidence`` (N, 1), of the type of the positions: those of the vertex;
-    - ``thickness`` (N, 1), of that type: the radius over the distance to the eighth nearest point. Well above 1 the
-      cloud shows the surface of the part; below 1 the radius is a guess.
+    - ``radius`` and ``confidence`` (N, 1), of the type of the positions: those of the vertex.
 
     Points that are not finite have -1 or NaN. Attributes of these names are replaced.
 
@@ -57,7 +55,7 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
     SizeVector[1000, 1]
     """
     points, vertex = vertex_of_cloud(skeleton, cloud)
-    found = labels(skeleton, points, vertex, thickness_of_points(skeleton, points, vertex), color)
+    found = labels(skeleton, points, vertex, color)
     cloud = points if cloud is None else cloud
     o3d = import_open3d()
     name, tensor = open3d_class(cloud)
@@ -78,10 +76,10 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
 
 
 def labels(
-    skeleton: Skeleton, points: np.ndarray, vertex: np.ndarray, thickness: np.ndarray, color: ColorChoice | None = None
+    skeleton: Skeleton, points: np.ndarray, vertex: np.ndarray, color: ColorChoice | None = None
 ) -> dict[str, np.ndarray]:
-    """What `annotate` says of points that belong to vertices, -1 for none, and have a thickness: (N,) arrays by name;
-    integers are int32, and ``colors`` (N, 3) uint8, if asked for.
+    """What `annotate` says of points that belong to vertices, -1 for none: (N,) arrays by name; integers are int32, and
+    ``colors`` (N, 3) uint8, if asked for.
     """
     branch = branch_of_point(skeleton, points, vertex)
     orders = np.where(branch >= 0, branch_table(skeleton).order[branch], -1)
@@ -89,7 +87,6 @@ def labels(
     found = {name: values.astype(np.int32) for name, values in whole.items()}
     for name, values in (("radius", skeleton.radii), ("confidence", skeleton.confidence)):
         found[name] = np.where(vertex >= 0, values[vertex], np.nan)
-    found["thickness"] = thickness
     if color is not None:
         found["colors"] = np.round(255 * shades(skeleton, color, branch, vertex)).astype(np.uint8)
     return found

@@ -36,7 +36,6 @@ class Scan:
     normals: np.ndarray | None = None
     attributes: Mapping[str, np.ndarray] = field(default_factory=dict)  # all else; names can stand in an expression
     triangles: np.ndarray = field(default_factory=lambda: NO_TRIANGLES)  # between the points, if it is a mesh
-    unset: frozenset[str] = frozenset()  # attributes that nobody gave: conditions may name them, results leave them out
     single: bool = False  # the file has its places as float32
 
     def __len__(self) -> int:
@@ -70,11 +69,6 @@ class Scan:
         return chosen
 
     @property
-    def given(self) -> dict[str, np.ndarray]:
-        """The attributes that are not unset."""
-        return {name: values for name, values in self.attributes.items() if name not in self.unset}
-
-    @property
     def shades(self) -> np.ndarray | None:
         """The colours from 0 to 255, (N, 3) uint8 array or None."""
         return None if self.colors is None else np.round(255 * np.clip(self.colors, 0, 1)).astype(np.uint8)
@@ -97,9 +91,9 @@ class Scan:
             cloud.point.colors = o3d.core.Tensor(shades)
         if self.normals is not None:
             cloud.point.normals = o3d.core.Tensor(np.ascontiguousarray(self.normals, float))
-        for name, values in self.given.items():  # integers as int32 if they fit: Open3D writes no int64
+        for name, values in self.attributes.items():  # integers as int32 if they fit: Open3D writes no int64
             whole = values.dtype.kind in "iub" and np.abs(values.astype(float)).max(initial=0) < 2**31
-            kind = np.int32 if whole else np.float32 if values.dtype == np.float32 else float
+            kind = values.dtype.type if values.dtype in (np.uint8, np.float32) else np.int32 if whole else float
             cloud.point[name] = o3d.core.Tensor(np.ascontiguousarray(values[:, None], kind))
         return cloud
 
@@ -159,12 +153,12 @@ def _value(node: ast.AST, columns: Mapping[str, np.ndarray]) -> Any:
     raise InvalidParameterError(f"{ast.unparse(node)!r} is not understood: compare attributes with numbers")
 
 
-def scan_of(columns: Mapping[str, np.ndarray], top: float | None = None, unset: bool = False) -> Scan:
+def scan_of(columns: Mapping[str, np.ndarray], top: float | None = None) -> Scan:
     """Points of columns, (N,) arrays by name: places, colours and normals by their names, all else are attributes, by
     names that can stand in an expression, such as ``class_``, ``Scalar_field`` and ``column_7``.
 
     Colours are numbers up to 255 or 65535, or up to 1 if they are no integers; `top` is the brightest in the file if
-    these are only some of its points. What is 0 throughout can be made `unset`.
+    these are only some of its points. Where they are all 0 they are none.
     """
     left = dict(columns)
 
@@ -179,7 +173,7 @@ def scan_of(columns: Mapping[str, np.ndarray], top: float | None = None, unset: 
     if colors is not None:
         top = brightest(colors) if top is None else top
         scale = 1 if top <= 1 and colors.dtype.kind == "f" else 255 if top <= 255 else 65535
-        colors = colors / scale if top or not unset else None
+        colors = colors / scale if top else None
     attributes: dict[str, np.ndarray] = {}
     for text, values in left.items():
         name = re.sub(r"\W+", "_", text).strip("_") or "column"
@@ -192,7 +186,6 @@ def scan_of(columns: Mapping[str, np.ndarray], top: float | None = None, unset: 
         colors,
         None if normals is None else np.ascontiguousarray(normals, float),
         attributes,
-        unset=frozenset(name for name, values in attributes.items() if unset and not values.any()),
         single=columns["x"].dtype.str[1:] == "f4",
     )
 

@@ -158,10 +158,9 @@ def read_blocks(
 ) -> Iterator[Scan]:
     """Read a scan a few points at a time, in the order of the file, or positions alone if they are to be `bare`.
 
-    Joined the blocks are the scan, to the last bit; in a block, attributes are unset that are so there. LAS, LAZ, PCD
-    (text and binary) and binary PLY without faces are read in blocks; everything else is one block. With `where` blocks
-    have fewer points, and there is none without. Errors are those of `read_cloud`, before the first block where the
-    size of the file shows that it is truncated.
+    Joined the blocks are the scan, to the last bit. LAS, LAZ, PCD (text and binary) and binary PLY without faces are
+    read in blocks; everything else is one block. With `where` blocks have fewer points, and there is none without.
+    Errors are those of `read_cloud`, before the first block where the size of the file shows that it is truncated.
     """
     if where is not None:
         parsed(where)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.segmentation import label_of_nearest, thickness_of_points, vertex_of_cloud
+from ..analysis.segmentation import vertex_of_cloud
 from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ..interop.atomic import check_ending, write_atomically
 from ..interop.clouds import SAMPLE_COUNT
@@ -137,8 +137,8 @@ def annotate_file(
     """Write a scan with labels to a file, block by block, in memory that does not grow with it.
 
     `glsk_o3d.annotate` for files: the same attributes, coloured by branch. The scan's own colours are ``scan_red``,
-    ``scan_green`` and ``scan_blue``. Attributes that PLY cannot hold become int or double; radius, confidence and
-    thickness are float if the coordinates are. ``thickness`` uses the spacing of the skeleton's points, if it has any.
+    ``scan_green`` and ``scan_blue``. Attributes that PLY cannot hold become int or double; radius and confidence are
+    float if the coordinates are.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def annotate_file(
     Raises
     ------
     FileFormatError
-        The scan changed during reading, or the output is no PLY file, or is the scan.
+        The output is no PLY file, or is the scan.
     InvalidParameterError
         The skeleton is empty. Other errors are those of `read_cloud`.
     OSError
@@ -176,61 +176,30 @@ def annotate_file(
     check_ending(output, "cloud with labels is PLY", LABELLED_ENDING)
     if Path(output).exists() and Path(path).exists() and os.path.samefile(path, output):
         raise FileFormatError(f"{os.fspath(output)}: is the scan itself: give another name")
-    label = _labeller(skeleton)
-    n, names = _survey(path, where)
-    changed = FileFormatError(f"{os.fspath(path)}: has changed while it was read: label it again when it is complete")
+    n = 0
 
     def write(temporary: Path) -> None:
-        written, row = 0, None
+        nonlocal n
+        row = np.dtype([])
         with temporary.open("wb") as stream:
             for block in read_blocks(path, where=where):
-                if not {*names} <= block.attributes.keys():
-                    raise changed
-                table = ply.rows_of(_columns(block, names, label(block.positions)))
-                if row is None:
-                    stream.write(ply.header_of(table.dtype, n))
-                elif row != table.dtype:
-                    raise changed
-                written, row = written + len(table), table.dtype
+                vertex = vertex_of_cloud(skeleton, block.positions)[1]
+                table = ply.rows_of(_columns(block, labels(skeleton, block.positions, vertex, "branch")))
+                if not n:
+                    row = table.dtype
+                    stream.write(ply.header_of(row, n, width=ply.COUNT_WIDTH))
+                n += len(table)
                 stream.write(table.tobytes())
-        if written != n:
-            raise changed
+            stream.seek(0)
+            stream.write(ply.header_of(row, n, width=ply.COUNT_WIDTH))
 
     write_atomically(output, write)
     return n
 
 
-def _labeller(skeleton: Skeleton) -> Callable[[np.ndarray], dict[str, np.ndarray]]:
-    """What says of points, (m, 3) float array, where they belong, coloured by branch."""
-    if len(skeleton.vertices) == 0:
-        raise InvalidParameterError("the skeleton is empty: there is nothing to label points with")
-    known = skeleton.vertex_of_point >= 0
-    row_of_point = np.where(known, np.arange(len(known)), -1)
-    vertex_of = np.append(skeleton.vertex_of_point, -1)
-    thickness_of = np.append(thickness_of_points(skeleton, skeleton.points, skeleton.vertex_of_point), np.nan)
-
-    def label(points: np.ndarray) -> dict[str, np.ndarray]:
-        if known.any():
-            nearest = label_of_nearest(skeleton.points, row_of_point, points)
-            vertex, thickness = vertex_of[nearest], thickness_of[nearest]
-        else:
-            vertex, thickness = vertex_of_cloud(skeleton, points)[1], np.full(len(points), np.nan)
-        return labels(skeleton, points, vertex, thickness, "branch")
-
-    return label
-
-
-def _survey(path: str | os.PathLike, where: str | None) -> tuple[int, list[str]]:
-    """How many points there are, and the names of the attributes that some of them have."""
-    n, names = 0, dict[str, None]()
-    for block in read_blocks(path, where=where):
-        n, names = n + len(block), names | dict.fromkeys(block.given)
-    return n, [*names]
-
-
-def _columns(block: Scan, names: list[str], found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _columns(block: Scan, found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Columns of a PLY file, by name: those of a scan, and labels."""
-    held = {"positions": block.positions, **{name: block.attributes[name] for name in names}, **found}
+    held = {"positions": block.positions, **block.attributes, **found}
     if block.normals is not None:
         held["normals"] = block.normals
     if (shades := block.shades) is not None:

@@ -11,7 +11,7 @@ import pytest
 from glsk_o3d import InvalidCloudError, InvalidParameterError, Skeleton, annotate, samples, skeletonize
 from glsk_o3d.analysis import branch_table, segment
 from glsk_o3d.analysis.branches import PRINTED_COLUMNS
-from glsk_o3d.analysis.segmentation import thickness_of_points, vertex_of_cloud
+from glsk_o3d.analysis.segmentation import vertex_of_cloud
 
 RNG = np.random.default_rng(0)
 ANGLES, SHARE = (30.0, 50.0), 0.6
@@ -349,14 +349,3 @@ def test_dropped_points_and_vertices_without_edges():
     assert vertex_of_cloud(bare, points)[1].tolist() == [0, -1, 2, 3, 1]  # the nearer end of the nearest edge
     assert segment(Skeleton(vertices, [], np.ones(4), (), (), ()), points).tolist() == [0, -1, 2, 3, 1]
     assert branch_table(skeleton).points.tolist() == [2, 1, 1]
-
-
-def test_thickness_is_the_radius_over_the_distance_to_the_eighth_nearest_point():
-    """Forty points, a unit apart, at an edge whose ends are two and one thick; and ten copies of one."""
-    edge = Skeleton([[0, 0, 0], [9, 0, 0]], [(0, 1)], [2, 1], (), (), ())
-    row = np.column_stack([np.arange(40.0), np.zeros((40, 2))])
-    found = thickness_of_points(edge, row, np.repeat([0, 1], 20))
-    np.testing.assert_allclose(found[4:36], np.repeat([2 / 4, 1 / 4], 16))  # four on each side
-    np.testing.assert_allclose(found[0], 2 / 8)
-    copies = thickness_of_points(edge, np.zeros((10, 3)), np.append(np.zeros(9, int), -1))
-    np.testing.assert_array_equal(copies, [*[np.inf] * 9, np.nan])

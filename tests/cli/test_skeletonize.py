@@ -153,7 +153,7 @@ def test_a_scan_with_labels_has_all_that_it_had(invoke, las, tmp_path):
         np.testing.assert_array_equal(back[name].numpy(), scan.point[name].numpy(), err_msg=name)
     assert (back.scan_red.numpy() == 255).all()
     expected = annotate(skeleton, color="branch").point
-    for name in ("skeleton_vertex", "branch", "order", "radius", "confidence", "thickness", "colors"):
+    for name in ("skeleton_vertex", "branch", "order", "radius", "confidence", "colors"):
         np.testing.assert_array_equal(back[name].numpy(), expected[name].numpy(), err_msg=name)
 
 

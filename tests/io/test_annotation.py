@@ -50,7 +50,6 @@ def test_tensor_clouds_keep_what_they_have_and_gain_ours(cloud, skeleton):
         "radius": skeleton.radii[vertex].astype(kind),
         "confidence": skeleton.confidence[vertex].astype(kind),
     }
-    assert annotated.pop("thickness").dtype == kind
     assert_equal(annotated, before | {name: values[:, None] for name, values in gained.items()})
     assert_equal(held(cloud), before)
     assert not np.shares_memory(annotated["positions"], before["positions"])

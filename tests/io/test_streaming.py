@@ -12,9 +12,7 @@ from glsk_o3d import (
     pipelines,
     read_cloud,
     read_sample,
-    read_skeleton,
     read_tensor_cloud,
-    save_skeleton,
     skeletonize,
 )
 from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
@@ -161,21 +159,7 @@ def test_labels_are_those_of_annotate(scans, skeleton, tmp_path, ending, where):
         np.testing.assert_array_equal(found.scan_green.numpy()[:, 0], cloud.point.colors.numpy()[:, 1])
 
 
-def test_thickness_is_that_of_the_points_of_the_skeleton_and_not_known_without(ring, tmp_path):
-    scan, marked = tmp_path / "scan.ply", tmp_path / "marked.ply"
-    assert o3d.t.io.write_point_cloud(str(scan), annotate(ring))
-    annotate_file(ring, scan, marked)
-    found = read_tensor_cloud(marked).point.thickness.numpy()
-    np.testing.assert_array_equal(found, annotate(ring).point.thickness.numpy())
-    save_skeleton(ring, tmp_path / "ring.ply")
-    bare = read_skeleton(tmp_path / "ring.ply")
-    annotate_file(bare, scan, marked)
-    found, expected = read_tensor_cloud(marked).point, annotate(bare, torus(1000).points).point
-    np.testing.assert_array_equal(found.skeleton_vertex.numpy(), expected.skeleton_vertex.numpy())
-    assert np.isnan(found.thickness.numpy()).all()
-
-
-def test_an_attribute_that_is_unset_in_early_blocks(ring, tmp_path):
+def test_an_attribute_that_is_0_in_early_blocks(ring, tmp_path):
     laspy, n = pytest.importorskip("laspy"), 30000
     data = laspy.LasData(laspy.LasHeader(point_format=0, version="1.2"))
     data.x, data.y, data.z = 100 * torus(n).points.T
@@ -184,7 +168,6 @@ def test_an_attribute_that_is_unset_in_early_blocks(ring, tmp_path):
     annotate_file(ring, tmp_path / "c.las", tmp_path / "out.ply")
     found = read_tensor_cloud(tmp_path / "out.ply").point
     np.testing.assert_array_equal(found.classification.numpy()[:, 0], data.classification)
-    assert "intensity" not in found
 
 
 WORDS = {"f4": "float", "f8": "double", "u1": "uchar", "i1": "char", "u2": "ushort", "i4": "int", "u4": "uint"}
@@ -209,7 +192,7 @@ def test_columns_of_a_ply_file_keep_their_types_where_open3d_reads_these(ring, t
         values = found[renamed.get(name, name)]
         assert values.dtype == {"u2": "<i4", "i1": "<i4", "u4": "<f8"}.get(kind, f"<{kind}"), name
         np.testing.assert_array_equal(values, rows[name], name)
-    assert {found[name].dtype for name in ("radius", "confidence", "thickness")} == {np.dtype("<f4")}
+    assert {found[name].dtype for name in ("radius", "confidence")} == {np.dtype("<f4")}
 
 
 # ------------------------------------------------------------------------------------------------------ what goes wrong
@@ -224,26 +207,6 @@ def test_a_scan_that_breaks_off_leaves_nothing_behind(scans, ring, tmp_path, end
     with pytest.raises(FileFormatError, match=path.name):
         annotate_file(ring, path, tmp_path / "out.ply")
     assert [*tmp_path.iterdir()] == [path]
-
-
-@pytest.mark.parametrize("change", ["more points", "no classification"])
-def test_a_scan_that_changes_meanwhile_leaves_nothing_behind(scans, ring, tmp_path, monkeypatch, change):
-    cloud = read_tensor_cloud(scans / "scan.ply")
-    path, survey = tmp_path / "scan.ply", streaming._survey
-    o3d.t.io.write_point_cloud(str(path), cloud)
-
-    def changes_then(*given):
-        found = survey(*given)
-        if change == "no classification":
-            del cloud.point["classification"]
-        other = cloud.append(cloud) if change == "more points" else cloud.select_by_index([*range(99)])
-        o3d.t.io.write_point_cloud(str(path), other)
-        return found
-
-    monkeypatch.setattr(streaming, "_survey", changes_then)
-    with pytest.raises(FileFormatError, match=r"scan\.ply: has changed while it was read"):
-        annotate_file(ring, path, tmp_path / "out.ply")
-    assert [each.name for each in tmp_path.iterdir()] == ["scan.ply"]
 
 
 def test_what_is_refused_before_reading(scans, ring, tmp_path):

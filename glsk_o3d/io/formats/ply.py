@@ -26,6 +26,7 @@ from .graphs import NoEdges, graph_skeleton
 SECTION = ("half_width", "half_thickness")
 LONGEST_LINE = 1 << 16  # derived: far beyond any line of a header, so that an endless file without lines ends
 LONGEST_HEADER = 1 << 12  # derived: in lines, likewise
+COUNT_WIDTH = 20  # derived: digits of the largest 64-bit number: a header may be written before the count is known
 MORE_THAN_PROMISED = "it holds more than its header promises"
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _KINDS = {
