@@ -257,7 +257,6 @@ SLOW: tuple[Callable[[Skeleton, Path], object], ...] = (
     lambda it, folder: glsk.save_preview(it, folder / "p.png"),
     lambda it, _: plt.close(glsk.plot_skeleton(it, color="radius").figure),
     lambda it, folder: glsk.save_rig(it, folder / "r.glb", cut_loops=True),
-    lambda it, folder: glsk.save_mesh(glsk.to_tubes(it), folder / "m.ply"),
     lambda it, _: with_support(it, glsk.pipelines.default(), draws=2, seed=0),
 )
 """What takes long."""

@@ -28,7 +28,6 @@ from .interop.clouds import Cloud
 from .io.annotation import annotate
 from .io.formats.gltf import save_rig
 from .io.geometry import to_line_set, to_tubes
-from .io.meshes import save_mesh
 from .io.scans import read_cloud, read_tensor_cloud
 from .io.skeletons import read_skeleton, read_truth, save_skeleton
 from .io.streaming import annotate_file, read_sample
@@ -107,7 +106,6 @@ __all__ = [
     "read_tensor_cloud",
     "read_truth",
     "remove_redundant_points",
-    "save_mesh",
     "save_preview",
     "save_recipe",
     "save_report",

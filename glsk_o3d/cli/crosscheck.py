@@ -48,8 +48,6 @@ def crosscheck(
 
 
 def _save_angles(check: Any, path: Path) -> None:
-    from ..interop.atomic import write_atomically
     from ..io.formats import ply
 
-    data = ply.content(ply.columns_of({"positions": check.points, "angle": check.angle}))
-    write_atomically(path, lambda temporary: temporary.write_bytes(data))
+    ply.save(path, {"positions": check.points, "angle": check.angle})

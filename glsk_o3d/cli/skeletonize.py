@@ -31,7 +31,7 @@ def skeletonize(
     root: Annotated[
         str | None, option("ROOT", "Grow one tree from there: x to -z, lowest along an axis, thickest, or x,y,z.")
     ] = None,
-    tubes: Annotated[Path | None, option("MESH", "Also write tubes as thick as the object: ply or obj.")] = None,
+    tubes: Annotated[Path | None, option("MESH", "Also write tubes as thick as the object: ply.")] = None,
     labelled: Annotated[
         Path | None, option("CLOUD", "Also write the scan with branch, radius, ... of every point, as ply.")
     ] = None,
@@ -49,9 +49,8 @@ def skeletonize(
 
     Everything that can be checked is checked before the computation starts. Files appear complete or not at all.
     """
-    from .. import ContractionRecorder, annotate_file, read_cloud, recipes, save_mesh, to_tubes
+    from .. import ContractionRecorder, annotate_file, read_cloud, recipes
     from ..interop.packages import require
-    from ..io.meshes import WRITTEN_MESH_ENDINGS
     from ..io.streaming import LABELLED_ENDING, sample_for
     from ..resampling import with_support
     from .overrides import choose, grown_from
@@ -66,7 +65,7 @@ def skeletonize(
 
     results = [
         *skeleton_outputs(output, preview, report, title=scan.name, cut_loops=cut_loops, recorder=recorder),
-        Output(tubes, WRITTEN_MESH_ENDINGS, "tubes are a mesh", lambda it, path: save_mesh(to_tubes(it), path)),
+        Output(tubes, (".ply",), "mesh of tubes is PLY", _save_tubes),
         Output(labelled, (LABELLED_ENDING,), "cloud with labels is PLY", label),
     ]
     if all(result.path is None for result in results):
@@ -92,6 +91,15 @@ def skeletonize(
     _tell(skeleton, seconds, files)
 
 
+def _save_tubes(skeleton: Skeleton, path: Path) -> None:
+    from .. import to_tubes
+    from ..io.formats import ply
+
+    tubes = to_tubes(skeleton)
+    held = {"positions": tubes.vertices, "normals": tubes.vertex_normals, "colors": tubes.vertex_colors}
+    ply.save(path, held, tubes.triangles)
+
+
 def demo(
     folder: Annotated[Path, output_option("FOLDER", "Made if it is not there.")] = Path("demo"),
     points: Annotated[int, option("N", "How many points the scan has.", "--points", "-n", min=8, max=10**9)] = 8192,
@@ -102,7 +110,6 @@ def demo(
     skeleton.ply, skeleton.json and skeleton.png (the picture to look at).
     """
     from .. import MissingPackageError, samples
-    from ..interop.atomic import write_atomically
     from ..interop.packages import require_for
     from ..io.formats import ply
 
@@ -114,8 +121,7 @@ def demo(
         require_for(picture.suffix)
     except MissingPackageError as error:  # all else can be shown
         missing = f"no {picture.name}: {error}"
-    data = ply.content(ply.columns_of({"positions": samples.sample_object(points).points}))
-    write_atomically(folder / "cloud.ply", lambda temporary: temporary.write_bytes(data))
+    ply.save(folder / "cloud.ply", {"positions": samples.sample_object(points).points})
     if not (flags.quiet or flags.as_json):
         echo(f"wrote {folder / 'cloud.ply'}")
     outputs = [folder / "skeleton.ply", folder / "skeleton.json"]

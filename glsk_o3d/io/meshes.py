@@ -1,24 +1,18 @@
-"""Triangle meshes from files, as scans of their vertices, and to files."""
+"""Triangle meshes from files, as scans of their vertices."""
 
 import json
-import os
 import re
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
 
-from ..errors import FileFormatError
-from ..interop.atomic import write_atomically
 from ..interop.packages import import_open3d
 from .formats import gltf, ply
-from .formats.graphs import line, text
-from .paths import check_budget, check_promised, number_rows, text_lines, unknown_ending
+from .paths import check_budget, check_promised, number_rows, text_lines
 from .scan import Scan
 
-WRITTEN_MESH_ENDINGS = (".ply", ".obj")
 _NAMES_MATERIALS = re.compile(rb"((?:^|[\r\n\f\0\\])[ \t]*)m")  # ``mtllib``, also where a line goes on
 
 
@@ -72,53 +66,3 @@ def _read_off(path: Path) -> Scan:
         check_promised(n, len(positions))
         faces = ply.text_table(lines, ply.Element("face", m, [ply.Column("vertex_indices", "i4", "i4")]))
     return Scan(positions, triangles=ply.triangles(faces, n))
-
-
-def save_mesh(mesh: Any, path: str | os.PathLike) -> None:
-    """Write a triangle mesh with the normals and colours of its vertices; the ending chooses the format.
-
-    Parameters
-    ----------
-    mesh : open3d.geometry.TriangleMesh
-        Normals are computed if it has none.
-    path : path-like
-        PLY or OBJ; it appears complete or not at all. Coordinates are kept to the last bit.
-
-    Raises
-    ------
-    FileFormatError
-        The ending is unknown, or the mesh is empty.
-    OSError
-        The folder does not exist, or the file cannot be written.
-
-    Examples
-    --------
-    >>> from glsk_o3d import skeletonize, to_tubes
-    >>> from glsk_o3d.samples import torus
-    >>> with TemporaryDirectory() as folder:
-    ...     save_mesh(to_tubes(skeletonize(torus(1000).points)), f"{folder}/ring.obj")
-    """
-    ending, mesh = Path(path).suffix.lower(), import_open3d().geometry.TriangleMesh(mesh)
-    if ending not in WRITTEN_MESH_ENDINGS:
-        raise unknown_ending(f"{os.fspath(path)}: tubes are a mesh", WRITTEN_MESH_ENDINGS)
-    if not mesh.has_vertices():
-        raise FileFormatError(f"{os.fspath(path)}: the mesh is empty: there is nothing to write")
-    if not mesh.has_vertex_normals():
-        mesh.compute_vertex_normals()
-    points, normals = np.asarray(mesh.vertices), np.asarray(mesh.vertex_normals)
-    colors, triangles = np.asarray(mesh.vertex_colors), np.asarray(mesh.triangles)
-    if ending == ".obj":
-        data = _obj(points, normals, colors, triangles)
-    else:
-        held = {"positions": points, "normals": normals} | ({"colors": colors} if len(colors) else {})
-        data = ply.content(ply.columns_of(held), triangles)
-    write_atomically(path, lambda temporary: temporary.write_bytes(data))
-
-
-def _obj(points: np.ndarray, normals: np.ndarray, colors: np.ndarray, triangles: np.ndarray) -> bytes:
-    """Open3D would write six digits."""
-    rows = np.hstack([points, colors]) if len(colors) else points
-    vertices = [line("v", *row) for row in rows.tolist()]
-    directions = [line("vn", *row) for row in normals.tolist()]
-    faces = [line("f", *(f"{corner}//{corner}" for corner in face)) for face in (triangles + 1).tolist()]
-    return text([*vertices, *directions, *faces])

@@ -48,7 +48,6 @@ def save_skeleton(
     *,
     cut_loops: bool = False,
     root: RootPlace | None = None,
-    format: str | None = None,
 ) -> None:
     """Write a skeleton to a file; the ending chooses the format.
 
@@ -76,8 +75,6 @@ def save_skeleton(
     root : str, int or (x, y, z), optional
         For the same formats: the root, as for `glsk_o3d.editing.reroot`. By default vertex 0 if the numbers go outwards
         from it, as from `pipelines.tree`; otherwise that of `glsk_o3d.analysis.branch_table`.
-    format : str, optional
-        The ending of another format than that of `path`, with or without its dot.
 
     Raises
     ------
@@ -100,20 +97,18 @@ def save_skeleton(
     0
     """
     path = Path(path)
-    chosen = FORMATS[skeleton_ending(path, format)]
+    chosen = FORMATS[skeleton_ending(path)]
     with holding_all(path):
         data = chosen.write(as_forest(skeleton, cut_loops, root) if chosen.trees else skeleton)
     write_atomically(path, lambda temporary: temporary.write_bytes(data))
 
 
-def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skeleton:
+def read_skeleton(path: str | os.PathLike) -> Skeleton:
     """Read a skeleton from a file that `save_skeleton` or another program wrote.
 
     Parameters
     ----------
     path : path-like
-    format : str, optional
-        As for `save_skeleton`.
 
     Returns
     -------
@@ -137,9 +132,9 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
     1.0
     """
     path = existing_file(path)
-    if format is None and path.suffix.lower() in {*SCAN_ENDINGS} - FORMATS.keys():
+    if path.suffix.lower() in {*SCAN_ENDINGS} - FORMATS.keys():
         raise _is_cloud(path)
-    ending = skeleton_ending(path, format)
+    ending = skeleton_ending(path)
     read = FORMATS[ending].read
     if read is None:
         raise FileFormatError(f"{path}: {ending} is only written; read are {', '.join(READABLE)}")
@@ -168,15 +163,11 @@ def holds_skeleton(path: str | os.PathLike) -> bool:
     return ending not in SCAN_ENDINGS
 
 
-def skeleton_ending(path: Path, format: str | None = None) -> str:
-    """The ending in the table of formats that a file name has, or that `format` names, with or without its dot.
-
-    FileFormatError if there is none; the message lists them.
-    """
-    ending = path.suffix.lower() if format is None else "." + format.lower().lstrip(".")
-    if ending not in FORMATS:
-        raise unknown_ending(path if format is None else f"format {format!r}", FORMATS)
-    return ending
+def skeleton_ending(path: Path) -> str:
+    """The ending in the table of formats that a file name has; FileFormatError, which lists them, if it has none."""
+    if path.suffix.lower() not in FORMATS:
+        raise unknown_ending(path, FORMATS)
+    return path.suffix.lower()
 
 
 def read_truth(path: str | os.PathLike) -> Truth:

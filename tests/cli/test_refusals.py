@@ -60,7 +60,7 @@ BEFORE_ANY_RUN = """
     2 skeletonize SCANS/ring.ply -o s.stl                  | s.stl: the file is a skeleton and its name ends in .ply or
     2 skeletonize SCANS/ring.ply --preview s.jpg           | s.jpg: the picture is a PNG and its name ends in .png
     2 skeletonize SCANS/ring.ply --report s.pdf            | s.pdf: the report is a page and its name ends in .html
-    2 skeletonize SCANS/ring.ply --tubes s.xyz             | s.xyz: the tubes are a mesh and its name ends in .ply or
+    2 skeletonize SCANS/ring.ply --tubes s.xyz             | s.xyz: the mesh of tubes is PLY and its name ends in .ply
     2 skeletonize SCANS/ring.ply --labelled s.pcd          | s.pcd: the cloud with labels is PLY and its name ends
     2 skeletonize SCANS/ring.ply --save-recipe a.yaml -o a.ply | a.yaml: the file is a recipe and its name ends in
     2 skeletonize SCANS/ring.ply -o s.ply -o ./s.ply       | s.ply: is named twice

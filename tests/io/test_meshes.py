@@ -1,4 +1,4 @@
-"""Triangle meshes from files, to files, and from Open3D."""
+"""Triangle meshes from files."""
 
 import json
 
@@ -6,12 +6,8 @@ import numpy as np
 import open3d as o3d
 import pytest
 
-from glsk_o3d import Skeleton, samples, to_tubes
 from glsk_o3d.errors import FileFormatError
-from glsk_o3d.io.meshes import WRITTEN_MESH_ENDINGS, save_mesh
 from glsk_o3d.io.scans import read_mesh, read_scan
-
-# ------------------------------------------------------------------------------------------------------------- reading
 
 
 def centres(mesh):
@@ -75,42 +71,6 @@ def test_off_files_that_make_no_sense(tmp_path, head, more, vertex, face):
     path.write_text(f"{head}\n3 1 0\n0 0 0{more}\n1 0 1{more}\n{vertex}{more if vertex == '2 0 0' else ''}\n{face}\n")
     with pytest.raises(FileFormatError, match=r"m\.off: not a valid \.off file"):
         read_scan(path)
-
-
-# ------------------------------------------------------------------------------------------------------------- writing
-
-FAR = np.array([471234.56789012, 5612345.67890123, 123.456789])
-
-
-@pytest.fixture(scope="module")
-def tubes():
-    ring = samples.torus(60)
-    return to_tubes(Skeleton(ring.nodes, ring.edges, ring.radii, (), (), ()))
-
-
-@pytest.mark.parametrize("ending", [*WRITTEN_MESH_ENDINGS, ".PLY"])
-@pytest.mark.parametrize("coloured", [False, True])
-def test_written_meshes_have_their_triangles_and_colours_and_all_digits(tmp_path, tubes, ending, coloured):
-    trimesh = pytest.importorskip("trimesh")
-    mesh, path = o3d.geometry.TriangleMesh(tubes).translate(FAR), tmp_path / f"t{ending}"
-    if not coloured:
-        mesh = o3d.geometry.TriangleMesh(mesh.vertices, mesh.triangles)
-    save_mesh(mesh, path)
-    assert mesh.has_vertex_normals() == coloured  # what was given is as it was
-    assert [*tmp_path.iterdir()] == [path]
-    back = trimesh.load(path, process=False, maintain_order=True)  # Open3D reads OBJ as float32
-    np.testing.assert_array_equal(back.vertices, np.asarray(mesh.vertices))
-    np.testing.assert_array_equal(back.faces, np.asarray(mesh.triangles))
-    back = read_mesh(path)
-    assert (back.has_vertex_normals(), back.has_vertex_colors()) == (True, coloured)
-
-
-def test_what_is_not_written(tmp_path, tubes):
-    with pytest.raises(FileFormatError, match="tubes are a mesh: unknown ending"):
-        save_mesh(tubes, tmp_path / "t.stl")
-    with pytest.raises(FileFormatError, match=r"m\.ply: the mesh is empty: there is nothing to write"):
-        save_mesh(to_tubes(Skeleton((), (), (), (), (), ())), tmp_path / "m.ply")
-    assert not list(tmp_path.iterdir())
 
 
 def test_rows_that_no_file_could_hold_are_refused_before_there_is_room_for_them(tmp_path):

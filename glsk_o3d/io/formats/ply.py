@@ -17,7 +17,9 @@ from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ...interop.atomic import write_atomically
 from ...skeleton import Skeleton
 from ..paths import check_promised, number_rows, text_lines
 from ..scan import COLOR_CHANNELS, NO_TRIANGLES, NORMAL_NAMES, Scan, scan_of
@@ -325,17 +327,22 @@ def content(columns: Mapping[str, np.ndarray], triangles: np.ndarray | None = No
     return header_of(vertices.dtype, len(vertices), more=more) + vertices.tobytes() + faces.tobytes()
 
 
-def columns_of(held: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Columns of the types that Open3D reads, of arrays, (n,) or (n, k), by the names that its clouds have."""
+def save(path: Path, held: Mapping[str, ArrayLike], triangles: ArrayLike | None = None) -> None:
+    """Write points with what `columns_of` takes, and triangles between them, as `write_atomically` does."""
+    data = content(columns_of(held), triangles if triangles is None else np.asarray(triangles))
+    write_atomically(path, lambda temporary: temporary.write_bytes(data))
+
+
+def columns_of(held: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
+    """Columns of the types that Open3D reads, of arrays, (n,) or (n, 3), by the names that its clouds have."""
     columns: dict[str, np.ndarray] = {}
-    for name, values in held.items():
+    for name, given in held.items():
+        values = np.asarray(given)
         if name == "colors" and values.dtype.kind == "f":
             values = np.round(255 * np.clip(values, 0, 1)).astype(np.uint8)
         elif values.dtype.str[1:] not in WRITTEN_KINDS:
             values = values.astype(np.int32 if np.can_cast(values.dtype, np.int32) else float)
-        values = values.reshape(len(values), -1)
-        names = [f"{name}_{i}" for i in range(values.shape[1])] if values.shape[1] > 1 else [name]
-        columns |= dict(zip(_PROPERTIES.get(name, names), values.T, strict=True))
+        columns |= dict(zip(_PROPERTIES.get(name, [name]), values.reshape(len(values), -1).T, strict=True))
     return columns
 
 
