@@ -1,28 +1,24 @@
 """Triangle meshes from files, as scans of their vertices."""
 
-import json
 import re
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from urllib.parse import unquote
 
 import numpy as np
 
 from ..interop.packages import import_open3d
-from .formats import gltf, ply
-from .paths import check_budget, check_promised, number_rows, text_lines
+from .formats import ply
+from .paths import check_promised, number_rows, text_lines
 from .scan import Scan
 
 _NAMES_MATERIALS = re.compile(rb"((?:^|[\r\n\f\0\\])[ \t]*)m")  # ``mtllib``, also where a line goes on
 
 
 def read_vertices(path: Path) -> Scan:
-    """The vertices of an OFF, OBJ, STL, glTF or GLB file, and the triangles between them."""
+    """The vertices of an OFF, OBJ or STL file, and the triangles between them."""
     ending = path.suffix.lower()
     if ending == ".off":
         return _read_off(path)
-    if ending in (".gltf", ".glb"):
-        _check_rows(path)
     if ending != ".obj":
         return _read_open3d(path)
     with TemporaryDirectory() as folder:  # Open3D would read all textures that it names
@@ -38,18 +34,6 @@ def _read_open3d(path: Path) -> Scan:
     colors = np.asarray(mesh.vertex_colors) if mesh.has_vertex_colors() else None
     normals = np.asarray(mesh.vertex_normals) if mesh.has_vertex_normals() else None
     return Scan(np.asarray(mesh.vertices), colors, normals, {}, np.asarray(mesh.triangles))
-
-
-def _check_rows(path: Path) -> None:
-    """ValueError where glTF promises more rows than its files could hold: Open3D makes room for all of them first."""
-    with path.open("rb") as stream:
-        head = stream.read(20)
-        binary = head[:4] == gltf.MAGIC.to_bytes(4, "little")
-        tree = json.loads(stream.read(int.from_bytes(head[12:16], "little")) if binary else head + stream.read())
-    named = (str(buffer.get("uri", "data:")) for buffer in tree.get("buffers", ()))
-    others = (path.parent / unquote(uri) for uri in named if not uri.startswith("data:"))
-    held = sum(file.stat().st_size for file in (path, *others) if file.is_file())
-    check_budget(sum(int(accessor["count"]) for accessor in tree.get("accessors", ())), held)
 
 
 def _read_off(path: Path) -> Scan:

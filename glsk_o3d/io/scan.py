@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import ast
-import operator
 import re
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import reduce
 from keyword import iskeyword
 from typing import Any
 
@@ -21,6 +18,11 @@ COLOR_CHANNELS = ["red", "green", "blue"]
 NORMAL_NAMES = ["nx", "ny", "nz"]
 NO_TRIANGLES = np.empty((0, 3), np.int64)
 ALL_ROWS = sys.maxsize  # derived: more than any file has
+_SIGNS: dict[str, Callable[[Any, Any], Any]] = {
+    **{"==": np.equal, "!=": np.not_equal, "<=": np.less_equal, ">=": np.greater_equal},
+    **{"<": np.less, ">": np.greater, "in": np.isin},
+}
+_COMPARISON = r"(\w+)\s*([=!<>]=|[<>]|\bin\b)\s*(.+)"
 
 
 class NoPoints(Exception):
@@ -57,15 +59,12 @@ class Scan:
         points do not have.
         """
         columns = {**dict(zip("xyz", self.positions.T, strict=True)), **self.attributes}
-        try:
-            chosen = np.asarray(_value(parsed(where), columns))
-        except (TypeError, ValueError) as error:
-            if isinstance(error, InvalidParameterError):
-                raise
-            cure = "write such as 'label in (1, 2)'"
-            raise InvalidParameterError(f"where = {where!r}: cannot be compared: {cure}") from None
-        if chosen.shape != (len(self),) or chosen.dtype != bool:
-            raise InvalidParameterError(f"where = {where!r}: is no condition on points: write such as 'label == 5'")
+        chosen = np.ones(len(self), bool)
+        for name, compare, value in parsed(where):
+            known = f"{name}_" if iskeyword(name) else name
+            if known not in columns:
+                raise InvalidParameterError(did_you_mean(name, columns, "attribute of the points"))
+            chosen &= compare(columns[known], value)
         return chosen
 
     @property
@@ -98,59 +97,22 @@ class Scan:
         return cloud
 
 
-# ---------------------------------------------------------------------------------------------------------- conditions
-
-_COMPARISONS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
-    ast.Eq: operator.eq,
-    ast.NotEq: operator.ne,
-    ast.Lt: operator.lt,
-    ast.LtE: operator.le,
-    ast.Gt: operator.gt,
-    ast.GtE: operator.ge,
-    ast.In: np.isin,
-    ast.NotIn: lambda values, among: ~np.isin(values, among),
-}
-_JOINS = {ast.And: np.logical_and, ast.Or: np.logical_or}
-_JOINING = ("and", "or", "not", "in")
-
-
-def parsed(where: str) -> ast.expr:
-    """A condition as a tree of Python's grammar; InvalidParameterError if it is none.
-
-    A word of Python's, such as ``class``, means the attribute that has a ``_`` behind it.
+def parsed(where: str) -> list[tuple[str, Callable[[Any, Any], Any], Any]]:
+    """The comparisons that a condition joins by ``and``: the name of an attribute, how it is compared, and with what
+    number or, behind ``in``, numbers. InvalidParameterError if it is no condition.
     """
-    words = re.sub(r"\b[a-z]+\b", lambda word: word[0] + "_" * (iskeyword(word[0]) and word[0] not in _JOINING), where)
-    try:
-        return ast.parse(words.strip(), mode="eval").body
-    except (SyntaxError, RecursionError, MemoryError) as error:
-        why = getattr(error, "msg", "it is nested too deeply")
-        cure = "write such as 'classification == 5 and not z < 2'"
-        raise InvalidParameterError(f"where = {where[:200]!r}: {why}: {cure}") from None
-
-
-def _value(node: ast.AST, columns: Mapping[str, np.ndarray]) -> Any:
-    """What a part of a condition comes to; nothing is let through but comparisons of columns and numbers, joined."""
-    match node:
-        case ast.BoolOp(op=op, values=parts):
-            return reduce(_JOINS[type(op)], [_value(part, columns) for part in parts])
-        case ast.UnaryOp(op=ast.Not(), operand=part):
-            return np.logical_not(_value(part, columns))
-        case ast.UnaryOp(op=ast.USub(), operand=part):
-            return np.negative(_value(part, columns), dtype=float)
-        case ast.Compare(left=left, ops=ops, comparators=rest) if all(type(op) in _COMPARISONS for op in ops):
-            sides = [_value(part, columns) for part in (left, *rest)]
-            pairs = zip(ops, sides, sides[1:], strict=False)
-            return reduce(np.logical_and, [_COMPARISONS[type(op)](a, b) for op, a, b in pairs])
-        case ast.Tuple(elts=parts) | ast.List(elts=parts) | ast.Set(elts=parts):
-            return [_value(part, columns) for part in parts]
-        case ast.Constant(value=int() | float() as number):
-            return number
-        case ast.Name(id=name):
-            if name not in columns:
-                asked = word if iskeyword(word := name.removesuffix("_")) else name
-                raise InvalidParameterError(did_you_mean(asked, columns, "attribute of the points"))
-            return columns[name]
-    raise InvalidParameterError(f"{ast.unparse(node)!r} is not understood: compare attributes with numbers")
+    found = []
+    for part in re.split(r"\band\b", where):
+        try:
+            name, sign, words = re.fullmatch(_COMPARISON, part.strip()).groups()  # type: ignore[union-attr]
+            value = [float(word) for word in words.strip("()[]").split(",") if word] if sign == "in" else float(words)
+        except (AttributeError, ValueError):
+            raise InvalidParameterError(
+                f"where = {where[:200]!r}: {part.strip()[:80]!r} is not understood: compare attributes with numbers, "
+                "such as 'classification in (2, 5) and z > 1.5'"
+            ) from None
+        found.append((name, _SIGNS[sign], value))
+    return found
 
 
 def scan_of(columns: Mapping[str, np.ndarray], top: float | None = None) -> Scan:

@@ -18,6 +18,7 @@ from .paths import MESH_ENDINGS, SCAN_ENDINGS, TEXT_ENDINGS, existing_file, unkn
 from .scan import ALL_ROWS, NoPoints, Scan, parsed
 from .skeletons import holds_skeleton
 
+FEW_VERTICES = 1000  # fitted: of a mesh; clouds of so few points have hardly a surface
 BLOCK_ROWS = 1_000_000  # measured: larger blocks are not read faster, and take more memory
 _log = logging.getLogger(__name__)
 
@@ -44,17 +45,16 @@ _SCAN_READERS: dict[str, Reader] = {
 def read_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
     """Read a point cloud, or the vertices of a mesh.
 
-    All coordinates keep their digits. A warning is logged for a mesh with large triangles, whose vertices describe the
-    surface badly.
+    All coordinates keep their digits. A warning is logged for a mesh of few vertices, which describe the surface badly.
 
     Parameters
     ----------
     path : path-like
-        PLY, PCD, CSV, TXT, ASC, XYZ, XYZN, XYZRGB, PTS; LAS and LAZ (extra ``las``), E57 (extra ``e57``); or a mesh
-        with triangles as OFF, OBJ, STL, glTF or GLB. In text, lines that hold no point are skipped and logged.
+        PLY, PCD, CSV, TXT, ASC, XYZ; LAS and LAZ (extra ``las``), E57 (extra ``e57``); or a mesh with triangles as
+        OFF, OBJ or STL. In text, lines that hold no point are skipped and logged.
     where : str, optional
-        Only points for which this holds, such as ``"classification == 5 and not 0 < z < 2"``: attributes and places,
-        compared with numbers or each other.
+        Only points for which this holds, such as ``"classification in (2, 5) and z > 1.5"``: attributes and places,
+        compared with numbers.
 
     Returns
     -------
@@ -113,28 +113,17 @@ def read_tensor_cloud(path: str | os.PathLike, *, where: str | None = None) -> A
 def read_scan(path: str | os.PathLike, where: str | None = None) -> Scan:
     """Read all that `read_tensor_cloud` does, and the triangles between the points of a mesh if all are taken."""
     scan = next(read_blocks(path, rows=ALL_ROWS, where=where))
-    if _coarse(scan.positions, scan.triangles):
+    if len(scan.triangles) and len(scan) < FEW_VERTICES:
         _log.warning(
-            "%s: the %d vertices of this mesh are far apart, and only vertices count as points: sample its surface "
+            "%s: this mesh has %d vertices, and only vertices count as points: sample its surface "
             "first, for example with Open3D's sample_points_uniformly",
             *(os.fspath(path), len(scan)),
         )
     return scan
 
 
-def _coarse(vertices: np.ndarray, triangles: np.ndarray) -> bool:
-    """Whether triangles with a side of more than a tenth of the diagonal make up half of the surface."""
-    if len(triangles) == 0 or triangles.min() < 0 or triangles.max() >= len(vertices):
-        return False
-    with np.errstate(all="ignore"):  # vertices may be anything
-        sides = vertices[triangles] - vertices[np.roll(triangles, 1, axis=1)]
-        area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-        large = np.linalg.norm(sides, axis=2).max(axis=1) > np.linalg.norm(np.ptp(vertices, axis=0)) / 10
-        return bool(area[large].sum() > area.sum() / 2)
-
-
 def read_mesh(path: str | os.PathLike) -> Any:
-    """Read an Open3D triangle mesh from PLY, OFF, OBJ, STL, glTF or GLB; errors as from `read_cloud`, and
+    """Read an Open3D triangle mesh from PLY, OFF, OBJ or STL; errors as from `read_cloud`, and
     FileFormatError for a file without triangles.
     """
     endings = (".ply", *MESH_ENDINGS)

@@ -1,7 +1,5 @@
 """Triangle meshes from files."""
 
-import json
-
 import numpy as np
 import open3d as o3d
 import pytest
@@ -15,7 +13,7 @@ def centres(mesh):
     return np.sort(np.asarray(mesh.vertices)[np.asarray(mesh.triangles)].mean(axis=1), axis=0)
 
 
-@pytest.mark.parametrize("ending", ["off", "obj", "stl", "gltf", "glb", "ply"])
+@pytest.mark.parametrize("ending", ["off", "obj", "stl", "ply"])
 @pytest.mark.parametrize(("resolution", "coarse"), [(5, True), (40, False)])
 def test_meshes_give_their_vertices(tmp_path, caplog, ending, resolution, coarse):
     mesh, path = (
@@ -23,24 +21,18 @@ def test_meshes_give_their_vertices(tmp_path, caplog, ending, resolution, coarse
         tmp_path / f"m.{ending}",
     )
     mesh.compute_vertex_normals()
-    if ending == "glb":
-        o3d.t.io.write_triangle_mesh(str(path), o3d.t.geometry.TriangleMesh.from_legacy(mesh))
-    else:
-        o3d.io.write_triangle_mesh(str(path), mesh)
+    o3d.io.write_triangle_mesh(str(path), mesh)
     np.testing.assert_allclose(centres(read_mesh(path)), centres(mesh), atol=1e-3)
     read_scan(path)
     assert ("sample_points_uniformly" in caplog.text) == coarse
 
 
-@pytest.mark.parametrize("ending", ["gltf", "glb", "stl", "off"])
+@pytest.mark.parametrize("ending", ["stl", "off"])
 def test_files_that_break_off(tmp_path, capfd, ending):
     mesh, path = o3d.geometry.TriangleMesh.create_sphere(1.0, 6), tmp_path / f"m.{ending}"
     if ending == "stl":
         mesh.compute_triangle_normals()
-    if ending == "glb":
-        o3d.t.io.write_triangle_mesh(str(path), o3d.t.geometry.TriangleMesh.from_legacy(mesh))
-    else:
-        o3d.io.write_triangle_mesh(str(path), mesh)
+    o3d.io.write_triangle_mesh(str(path), mesh)
     whole = path.read_bytes()
     for cut in range(1, len(whole) - 1, len(whole) // 50):
         path.write_bytes(whole[:cut])
@@ -53,7 +45,7 @@ def test_what_is_no_mesh(cloud, tmp_path):
     o3d.io.write_point_cloud(str(tmp_path / "c.ply"), cloud)
     with pytest.raises(FileFormatError, match=r"c\.ply.* cloud"):
         read_mesh(tmp_path / "c.ply")
-    with pytest.raises(FileFormatError, match=r"m\.xyz.*\.ply.*\.glb"):
+    with pytest.raises(FileFormatError, match=r"m\.xyz.*\.ply.*\.stl"):
         read_mesh(tmp_path / "m.xyz")
 
 
@@ -71,10 +63,3 @@ def test_off_files_that_make_no_sense(tmp_path, head, more, vertex, face):
     path.write_text(f"{head}\n3 1 0\n0 0 0{more}\n1 0 1{more}\n{vertex}{more if vertex == '2 0 0' else ''}\n{face}\n")
     with pytest.raises(FileFormatError, match=r"m\.off: not a valid \.off file"):
         read_scan(path)
-
-
-def test_rows_that_no_file_could_hold_are_refused_before_there_is_room_for_them(tmp_path):
-    tree = {"asset": {"version": "2.0"}, "accessors": [{"count": 10**12, "type": "VEC3", "componentType": 5126}]}
-    (tmp_path / "m.gltf").write_text(json.dumps(tree))
-    with pytest.raises(FileFormatError, match=r"m\.gltf.*would take 1000000000000"):
-        read_scan(tmp_path / "m.gltf")

@@ -39,10 +39,6 @@ def test_named_columns(tmp_path, program):
     [
         ("c.xyz", "1 2 3", None, None, {}),
         ("c.xyz", "1, 2, 3", None, None, {}),
-        ("c.xyzn", "1 2 3 0 3 4", None, [0, 3, 4], {}),
-        ("c.xyzrgb", "1 2 3 0.25 1 0", [0.25, 1, 0], None, {}),
-        ("c.pts", "1 2 3 -905 255 51 0", [1, 0.2, 0], None, {"intensity": -905}),
-        ("c.pts", "1 2 3 255 51 0", [1, 0.2, 0], None, {}),
         ("c.txt", "P1 1 2 3", None, None, {}),
     ],
 )
