@@ -33,7 +33,7 @@ READERS: dict[str, Callable[[Path], object]] = {
 """What reads a kind of files."""
 HEADER_BYTES = 400  # where most mistakes are made
 EXTREMES = (-1, 0, 1, 2**31 - 1, 2**31, 2**32, 2**63, 10**18, 10**400, "1e308", "1e309", "-0", "nan", "inf", "0x1", "")
-ENDINGS = (".ply", ".pcd", ".xyz", ".obj", ".off", ".stl", ".las", ".laz", ".e57", ".json", ".npz", ".swc")
+ENDINGS = (".ply", ".pcd", ".xyz", ".obj", ".stl", ".las", ".laz", ".e57", ".json", ".npz", ".swc")
 
 
 def file_case(rng: np.random.Generator, folder: Path) -> tuple[str, str, list[str], int]:
@@ -152,7 +152,7 @@ def clouds(folder: Path, n: int = 60) -> dict[str, bytes]:
         path = folder / f"s{ending.split()[0]}"
         o3d.io.write_point_cloud(str(path), cloud, **options)
         found[f"cloud {ending}"] = path.read_bytes()
-    for ending in (".off", ".obj", ".stl", ".ply mesh"):
+    for ending in (".obj", ".stl", ".ply mesh"):
         path = folder / f"m{ending.split()[0]}"
         o3d.io.write_triangle_mesh(str(path), mesh)
         found[f"cloud {ending}"] = path.read_bytes()

@@ -73,11 +73,10 @@ def seeds(n: int) -> dict[str, tuple[bytes, np.ndarray]]:
 
 def _promises(ending: str, data: bytes) -> Promises:
     """What a file says of how much there is."""
-    if ending in (".ply", ".pcd", ".off"):
+    if ending in (".ply", ".pcd"):
         patterns = {
             ".ply": rb"element \w+ (\d+)",
             ".pcd": rb"(?:POINTS|WIDTH|HEIGHT|COUNT(?: \d+)*) (\d+)",
-            ".off": rb"OFF\s+(\d+) (\d+)",
         }
         for match in re.finditer(patterns[ending], data[:1000]):
             for group in range(1, len(match.groups()) + 1):
@@ -276,8 +275,6 @@ BOMBS: dict[str, Callable[[int], bytes]] = {
     "cloud .obj polygon": lambda n: b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf" + b" 1 2 3" * min(n, 300000) + b"\n",
     "cloud .obj faces": lambda n: b"v 0 0 0\nv 1 0 0\nv 0 1 0\n" + b"f 1 2 3\n" * min(n, 400000),
     "cloud .obj groups": lambda n: b"v 0 0 0\nv 1 0 0\nv 0 1 0\n" + b"g a\nf 1 2 3\n" * min(n, 100000),
-    "cloud .off faces": lambda n: b"OFF\n3 %d 0\n0 0 0\n1 0 0\n0 1 0\n" % n + b"3 0 1 2\n" * n,
-    "cloud .off empty": lambda n: b"OFF\n3 %d 0\n0 0 0\n1 0 0\n0 1 0\n" % n + b"0\n" * n,
     "cloud .stl text": lambda n: (
         b"solid a\n"
         + b"facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"

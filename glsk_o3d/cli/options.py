@@ -39,7 +39,7 @@ def root_option(help: str) -> Any:
 SkeletonFile = Annotated[Path, argument("SKELETON", "A skeleton in a file: json, npz, ply, obj or swc.")]
 ScanFile = Annotated[
     Path,
-    argument("SCAN", "A cloud: ply, pcd, csv, txt, asc, xyz, las, laz, e57; or a mesh: off, obj, stl."),
+    argument("SCAN", "A cloud: ply, pcd, csv, txt, asc, xyz, las, laz, e57; or a mesh: obj, stl."),
 ]
 Where = Annotated[
     str | None, option("CONDITION", "Take only points such as 'classification == 5'; 'glsk info' says what a file has.")

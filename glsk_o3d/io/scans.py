@@ -3,16 +3,17 @@
 import errno
 import logging
 import os
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 from ..errors import FileFormatError, InvalidCloudError, MissingPackageError, brief
 from ..interop.packages import import_open3d
-from . import meshes
 from .formats import pcd, ply, scanners, text_tables
 from .paths import MESH_ENDINGS, SCAN_ENDINGS, TEXT_ENDINGS, existing_file, unknown_ending
 from .scan import ALL_ROWS, NoPoints, Scan, parsed
@@ -20,6 +21,7 @@ from .skeletons import holds_skeleton
 
 FEW_VERTICES = 1000  # fitted: of a mesh; clouds of so few points have hardly a surface
 BLOCK_ROWS = 1_000_000  # measured: larger blocks are not read faster, and take more memory
+_NAMES_MATERIALS = re.compile(rb"((?:^|[\r\n\f\0\\])[ \t]*)m")  # ``mtllib``, also where a line goes on
 _log = logging.getLogger(__name__)
 
 Reader = Callable[[Path, int, bool], tuple[int | None, Iterator[Scan]]]
@@ -32,8 +34,21 @@ def _whole(read: Callable[[Path], Scan]) -> Reader:
     return lambda path, rows, bare: (None, map(read, [path]))  # not read before it is asked for
 
 
+def _vertices(path: Path) -> Scan:
+    """The vertices of an OBJ or STL file, and the triangles between them."""
+    o3d = import_open3d()
+    with TemporaryDirectory() as folder, o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
+        if path.suffix.lower() == ".obj":  # Open3D would read all textures that it names
+            path, whole = Path(folder, "mesh.obj"), path
+            path.write_bytes(_NAMES_MATERIALS.sub(rb"\1#", whole.read_bytes()))
+        mesh = o3d.io.read_triangle_mesh(str(path))
+    colors = np.asarray(mesh.vertex_colors) if mesh.has_vertex_colors() else None
+    normals = np.asarray(mesh.vertex_normals) if mesh.has_vertex_normals() else None
+    return Scan(np.asarray(mesh.vertices), colors, normals, {}, np.asarray(mesh.triangles))
+
+
 _SCAN_READERS: dict[str, Reader] = {
-    **dict.fromkeys(MESH_ENDINGS, _whole(meshes.read_vertices)),
+    **dict.fromkeys(MESH_ENDINGS, _whole(_vertices)),
     **dict.fromkeys(TEXT_ENDINGS, _whole(text_tables.read)),
     **dict.fromkeys((".las", ".laz"), scanners.blocks),
     ".e57": _whole(scanners.read_e57),
@@ -51,7 +66,7 @@ def read_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
     ----------
     path : path-like
         PLY, PCD, CSV, TXT, ASC, XYZ; LAS and LAZ (extra ``las``), E57 (extra ``e57``); or a mesh with triangles as
-        OFF, OBJ or STL. In text, lines that hold no point are skipped and logged.
+        OBJ or STL. In text, lines that hold no point are skipped and logged.
     where : str, optional
         Only points for which this holds, such as ``"classification in (2, 5) and z > 1.5"``: attributes and places,
         compared with numbers.
@@ -123,7 +138,7 @@ def read_scan(path: str | os.PathLike, where: str | None = None) -> Scan:
 
 
 def read_mesh(path: str | os.PathLike) -> Any:
-    """Read an Open3D triangle mesh from PLY, OFF, OBJ or STL; errors as from `read_cloud`, and
+    """Read an Open3D triangle mesh from PLY, OBJ or STL; errors as from `read_cloud`, and
     FileFormatError for a file without triangles.
     """
     endings = (".ply", *MESH_ENDINGS)

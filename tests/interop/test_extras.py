@@ -107,17 +107,3 @@ def test_the_command_asks_before_the_work(bare, tmp_path):
     assert done.returncode == 1
     assert re.fullmatch(r'glsk: error: .*pip install "glsk-o3d\[pictures\]"\n', done.stderr)
     assert [path.name for path in tmp_path.iterdir()] == ["scan.xyz"]
-
-
-PYMESHLAB = 'pymeshlab cannot be imported: pip install "glsk-o3d[meshlab]"\n'
-
-
-def test_a_filter_script_says_at_once_what_it_needs(bare, root):
-    assert bare(COMMAND, "run", "--list").returncode == 0
-    script = root / "filters" / "scan_cleanup.mlx"
-    theirs = re.findall(r'<filter name="([^"]+)"', script.read_text())
-    done = bare(COMMAND, "run", "scan_cleanup", "nowhere.ply", "-o", "c.ply")  # the scan is not looked at
-    assert done.returncode == 1
-    assert done.stderr.startswith(f"glsk: error: {script}: MeshLab's own filters ")
-    assert done.stderr.endswith(PYMESHLAB)
-    assert re.findall(r"'([^']+)' \(line \d+\)", done.stderr) == theirs

@@ -87,7 +87,7 @@ DAMAGED = {
         *("1 0 0 0 0 1\n", "1 0 0 0 0 1 nan\n2 0 0 0 0\n"),
     ],
     ".ply": [
-        PLY + "end_header\n1 2 3\n4 5\n",
+        *(PLY + f"end_header\n1 2 3\n{row}\n" for row in ("4 5", "4 five 6")),
         PLY + "element edge 1\nproperty int vertex1\nproperty int vertex2\nend_header\n1 2 3\n4 5 6\n0 2\n",
         PLY.replace("ascii", "binary_little_endian") + "end_header\nabc",
         PLY.replace("ascii", "klingon") + "end_header\n",

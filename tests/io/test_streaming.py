@@ -159,17 +159,6 @@ def test_labels_are_those_of_annotate(scans, skeleton, tmp_path, ending, where):
         np.testing.assert_array_equal(found.scan_green.numpy()[:, 0], cloud.point.colors.numpy()[:, 1])
 
 
-def test_an_attribute_that_is_0_in_early_blocks(ring, tmp_path):
-    laspy, n = pytest.importorskip("laspy"), 30000
-    data = laspy.LasData(laspy.LasHeader(point_format=0, version="1.2"))
-    data.x, data.y, data.z = 100 * torus(n).points.T
-    data.classification = np.arange(n) > 25000
-    data.write(tmp_path / "c.las")
-    annotate_file(ring, tmp_path / "c.las", tmp_path / "out.ply")
-    found = read_tensor_cloud(tmp_path / "out.ply").point
-    np.testing.assert_array_equal(found.classification.numpy()[:, 0], data.classification)
-
-
 WORDS = {"f4": "float", "f8": "double", "u1": "uchar", "i1": "char", "u2": "ushort", "i4": "int", "u4": "uint"}
 
 

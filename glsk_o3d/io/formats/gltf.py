@@ -15,7 +15,6 @@ from ...analysis.segmentation import vertex_of_cloud
 from ...errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ...interop.atomic import check_ending, write_atomically
 from ...interop.clouds import cloud_points, open3d_class
-from ...interop.packages import import_open3d
 from ...numerics.vectors import norm, unit
 from ...refinement.rooted import RootPlace
 from ...skeleton import Skeleton
@@ -118,6 +117,7 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
     """The content of a GLB file."""
     if len(forest.edges) > MOST_JOINTS:
         raise FileFormatError(f"glTF counts at most {MOST_JOINTS} bones, not {len(forest.edges)}: simplify it first")
+    mesh = mesh.to_legacy() if open3d_class(mesh) in (("PointCloud", True), ("TriangleMesh", True)) else mesh
     points = cloud_points(mesh)
     if not np.isfinite(points).all():
         raise InvalidCloudError("the surface has points that are not finite: drop them first")
@@ -138,9 +138,7 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
         **{name: buffer.add(values, "f4", "VEC3") for name, values in _looks(mesh, len(points)).items()},
     }
     primitive: dict[str, Any] = {"attributes": attributes, "mode": POINTS_MODE}
-    (kind, tensor), triangles = open3d_class(mesh), np.empty((0, 3))
-    if kind == "TriangleMesh":
-        triangles = mesh.triangle.indices.cpu().numpy() if tensor else np.asarray(mesh.triangles)
+    triangles = np.asarray(mesh.triangles) if open3d_class(mesh)[0] == "TriangleMesh" else np.empty((0, 3))
     if len(triangles):
         primitive |= {"indices": buffer.add(triangles.reshape(-1), "u4", "SCALAR"), "mode": TRIANGLES_MODE}
     x, y, z = origin.tolist()
@@ -164,17 +162,14 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
 
 def _looks(mesh: Any, n: int) -> dict[str, np.ndarray]:
     """Normals and colours, where there is one of each vertex; colours are linear in glTF."""
-    kind, tensor = open3d_class(mesh)
-    if kind not in ("PointCloud", "TriangleMesh"):
-        return {}
-    geometry = mesh if tensor else getattr(import_open3d().t.geometry, kind).from_legacy(mesh)
-    held, found = geometry.vertex if kind == "TriangleMesh" else geometry.point, {}
-    looks = {name: held[name].cpu().numpy() for name in ("normals", "colors") if name in held and len(held[name]) == n}
-    if "normals" in looks and (norm(looks["normals"]) > 0).all():
-        found["NORMAL"] = unit(looks["normals"])
-    if "colors" in looks:
-        shades = looks["colors"] / 255 if looks["colors"].dtype == np.uint8 else looks["colors"]
-        found["COLOR_0"] = np.where(shades <= SRGB_KNEE, shades / 12.92, ((shades + 0.055) / 1.055) ** 2.4)
+    kind, found = open3d_class(mesh)[0], {}
+    if kind in ("PointCloud", "TriangleMesh"):
+        of_vertices = "" if kind == "PointCloud" else "vertex_"
+        normals, shades = (np.asarray(getattr(mesh, f"{of_vertices}{name}")) for name in ("normals", "colors"))
+        if len(normals) == n and (norm(normals) > 0).all():
+            found["NORMAL"] = unit(normals)
+        if len(shades) == n:
+            found["COLOR_0"] = np.where(shades <= SRGB_KNEE, shades / 12.92, ((shades + 0.055) / 1.055) ** 2.4)
     return found
 
 

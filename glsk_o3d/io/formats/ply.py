@@ -156,14 +156,14 @@ def read_tables(stream: BinaryIO, *wanted: str) -> dict[str, Table]:
     else:
         lines = text_lines(stream)
         for element in elements:
-            tables[element.name] = text_table(lines, element)
+            tables[element.name] = _text(lines, element)
         rest = next(lines, "").encode()
     if rest and sum(element.rows > 0 for element in elements) > 1:  # then a wrong count shifts what comes after it
         raise ValueError(MORE_THAN_PROMISED)
     return {name: table for name, table in tables.items() if name in wanted}
 
 
-def text_table(lines: Iterator[str], element: Element) -> Table:
+def _text(lines: Iterator[str], element: Element) -> Table:
     """The next rows of text as a table."""
     if element.has_lists:
         return _row_by_row(element, map(_words, islice(lines, element.rows)))

@@ -14,7 +14,7 @@ from typing import NamedTuple, TextIO
 
 import numpy as np
 
-from ..scan import NORMAL_NAMES, NoPoints, Scan, scan_of
+from ..scan import NoPoints, Scan, scan_of
 
 _log = logging.getLogger(__name__)
 
@@ -28,7 +28,6 @@ _ROLES = {
     **dict.fromkeys(("r", "red", "rf"), "red"),
     **dict.fromkeys(("g", "green", "gf"), "green"),
     **dict.fromkeys(("b", "blue", "bf"), "blue"),
-    **{name: name for name in NORMAL_NAMES},
     **{f"{word}{mark}{axis}": f"n{axis}" for word in ("normal", "n") for mark in ("_", "") for axis in "xyz"},
 }
 
