@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import base64
 import io
-import json
-import struct
 import tempfile
 import warnings
 from collections.abc import Callable
@@ -36,7 +33,7 @@ READERS: dict[str, Callable[[Path], object]] = {
 """What reads a kind of files."""
 HEADER_BYTES = 400  # where most mistakes are made
 EXTREMES = (-1, 0, 1, 2**31 - 1, 2**31, 2**32, 2**63, 10**18, 10**400, "1e308", "1e309", "-0", "nan", "inf", "0x1", "")
-ENDINGS = (".ply", ".pcd", ".xyz", ".pts", ".obj", ".off", ".stl", ".las", ".laz", ".e57", ".json", ".npz", ".swc")
+ENDINGS = (".ply", ".pcd", ".xyz", ".obj", ".stl", ".las", ".laz", ".e57", ".json", ".npz", ".swc")
 
 
 def file_case(rng: np.random.Generator, folder: Path) -> tuple[str, str, list[str], int]:
@@ -150,17 +147,15 @@ def clouds(folder: Path, n: int = 60) -> dict[str, bytes]:
         ".pcd compressed": {"compressed": True},
         ".ply binary": {},
         ".ply ascii": {"write_ascii": True},
-        ".pts": {},
         ".xyz": {},
     }.items():
         path = folder / f"s{ending.split()[0]}"
         o3d.io.write_point_cloud(str(path), cloud, **options)
         found[f"cloud {ending}"] = path.read_bytes()
-    for ending in (".off", ".obj", ".stl", ".gltf", ".ply mesh"):
+    for ending in (".obj", ".stl", ".ply mesh"):
         path = folder / f"m{ending.split()[0]}"
         o3d.io.write_triangle_mesh(str(path), mesh)
         found[f"cloud {ending}"] = path.read_bytes()
-    found["cloud .glb"] = _packed(found["cloud .gltf"])
     rows = "\n".join(",".join(f"{value:.3f}" for value in row) + ",1" for row in points)
     found["cloud .csv"] = f"x,y,z,label\n{rows}\n".encode()
     found["cloud .txt"] = rows.replace(",", " ").encode()
@@ -203,19 +198,9 @@ def _in_chunks(laz: bytes, points: bytes) -> bytes:
     return stream.getvalue()
 
 
-def _packed(gltf: bytes) -> bytes:
-    """The same as GLB: Open3D does not read the one that it writes."""
-    tree = json.loads(gltf)
-    content = base64.b64decode(tree["buffers"][0].pop("uri").partition(",")[2])
-    words = json.dumps(tree).encode()
-    words, content = words + b" " * (-len(words) % 4), content + bytes(-len(content) % 4)
-    chunks = struct.pack("<I4s", len(words), b"JSON") + words + struct.pack("<I4s", len(content), b"BIN\0") + content
-    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
-
-
 def _skeletons(folder: Path) -> dict[str, bytes]:
     skeleton, found = glsk.skeletonize(samples.torus(300).points), {}
-    for ending in (".json", ".npz", ".swc", ".graphml", ".cgal", ".ply", ".obj"):
+    for ending in (".json", ".npz", ".swc", ".ply", ".obj"):
         glsk.save_skeleton(skeleton, folder / f"k{ending}", cut_loops=True)
         found[f"skeleton {ending}"] = (folder / f"k{ending}").read_bytes()
     return found

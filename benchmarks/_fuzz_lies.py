@@ -35,7 +35,7 @@ def lie_case(rng: np.random.Generator, folder: Path) -> tuple[str, str, list[str
     A finding is also a point that the file does not hold.
     """
     n = int(rng.choice(SIZES))
-    none = (".csv", ".txt", ".xyz", ".obj", ".gltf", ".glb")  # which have none, or are read by Open3D
+    none = (".csv", ".txt", ".xyz", ".obj")  # which have none, or are read by Open3D
     names = [name for name in seeds(n) if name.split()[1] not in none]
     name = names[rng.integers(len(names))]
     data, places = seeds(n)[name]
@@ -73,12 +73,10 @@ def seeds(n: int) -> dict[str, tuple[bytes, np.ndarray]]:
 
 def _promises(ending: str, data: bytes) -> Promises:
     """What a file says of how much there is."""
-    if ending in (".ply", ".pcd", ".off", ".pts"):
+    if ending in (".ply", ".pcd"):
         patterns = {
             ".ply": rb"element \w+ (\d+)",
             ".pcd": rb"(?:POINTS|WIDTH|HEIGHT|COUNT(?: \d+)*) (\d+)",
-            ".off": rb"OFF\s+(\d+) (\d+)",
-            ".pts": rb"^(\d+)",
         }
         for match in re.finditer(patterns[ending], data[:1000]):
             for group in range(1, len(match.groups()) + 1):
@@ -253,7 +251,6 @@ def _zipped(n: int) -> bytes:
 
 
 BOMBS: dict[str, Callable[[int], bytes]] = {
-    "cloud .gltf brackets": lambda n: b"[" * n,
     "cloud .pcd count": lambda n: _pcd_of(1, b"1 2 3\n", "ascii", "x y z a", f"1 1 1 {100 * n}"),
     "cloud .pcd fields": lambda n: _pcd_of(
         10, b"1 2 3\n", "ascii", "x y z" + " a" * min(n, 9000), "1 1 1" + " 9999" * min(n, 9000)
@@ -278,8 +275,6 @@ BOMBS: dict[str, Callable[[int], bytes]] = {
     "cloud .obj polygon": lambda n: b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf" + b" 1 2 3" * min(n, 300000) + b"\n",
     "cloud .obj faces": lambda n: b"v 0 0 0\nv 1 0 0\nv 0 1 0\n" + b"f 1 2 3\n" * min(n, 400000),
     "cloud .obj groups": lambda n: b"v 0 0 0\nv 1 0 0\nv 0 1 0\n" + b"g a\nf 1 2 3\n" * min(n, 100000),
-    "cloud .off faces": lambda n: b"OFF\n3 %d 0\n0 0 0\n1 0 0\n0 1 0\n" % n + b"3 0 1 2\n" * n,
-    "cloud .off empty": lambda n: b"OFF\n3 %d 0\n0 0 0\n1 0 0\n0 1 0\n" % n + b"0\n" * n,
     "cloud .stl text": lambda n: (
         b"solid a\n"
         + b"facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
@@ -288,8 +283,6 @@ BOMBS: dict[str, Callable[[int], bytes]] = {
     ),
     "skeleton .npz zeros": _zipped,
     "skeleton .json brackets": lambda n: b"[" * n,
-    "skeleton .graphml entities": lambda n: _entities("graphml") + b"<graphml>&h;</graphml>",
-    "skeleton .graphml deep": lambda n: b"<graphml>" * n + b"</graphml>" * n,
     "skeleton .swc rows": lambda n: b"1 0 0 0 0 0 -1\n" * n,
     "script .mlx entities": lambda n: _entities("FilterScript") + b"<FilterScript>&h;</FilterScript>",
     "script .mlx deep": lambda n: b"<FilterScript>" * n + b"</FilterScript>" * n,
@@ -329,7 +322,6 @@ NAMING: dict[str, Callable[[str], bytes]] = {
     "cloud .obj goes on": lambda at: f"mt\\\nllib {at}\n{_TRIANGLE}".encode(),
     "cloud .obj map": lambda at: f"mtllib given.mtl\n{_TRIANGLE}".encode(),
     "script .mlx entity": lambda at: f'<!DOCTYPE FilterScript SYSTEM "{at}"><FilterScript/>'.encode(),
-    "skeleton .graphml entity": lambda at: f'<!DOCTYPE graphml SYSTEM "{at}"><graphml/>'.encode(),
     "list .txt clouds": lambda at: f"{at}\n".encode(),
 }
 """What names another file, by kind and ending."""

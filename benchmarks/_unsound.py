@@ -225,7 +225,6 @@ USES: tuple[Callable[[Skeleton, Path], object], ...] = (
         lambda it, _, color=color: glsk.to_line_set(it, color)
         for color in ("branch", "order", "radius", "confidence", "support")
     ),
-    lambda it, _: glsk.to_tensor_line_set(it, "radius"),
     lambda it, _: glsk.to_tubes(it),
     lambda it, _: glsk.to_tubes(it, radius=0.1),
     lambda it, _: glsk.to_pymeshlab(it),
@@ -256,7 +255,6 @@ SLOW: tuple[Callable[[Skeleton, Path], object], ...] = (
     lambda it, folder: glsk.save_preview(it, folder / "p.png"),
     lambda it, _: plt.close(glsk.plot_skeleton(it, color="radius").figure),
     lambda it, folder: glsk.save_rig(it, folder / "r.glb", cut_loops=True),
-    lambda it, folder: glsk.save_mesh(glsk.to_tubes(it), folder / "m.ply"),
     lambda it, _: with_support(it, glsk.pipelines.default(), draws=2, seed=0),
 )
 """What takes long."""

@@ -27,9 +27,8 @@ from .errors import (
 from .interop.clouds import Cloud
 from .io.annotation import annotate
 from .io.formats.gltf import save_rig
-from .io.geometry import to_line_set, to_tensor_line_set, to_tubes
-from .io.meshes import save_mesh
-from .io.scans import read_cloud, read_tensor_cloud, save_tensor_cloud
+from .io.geometry import to_line_set, to_tubes
+from .io.scans import read_cloud, read_tensor_cloud
 from .io.skeletons import read_skeleton, read_truth, save_skeleton
 from .io.streaming import annotate_file, read_sample
 from .lpr_reducer import LPRReducer
@@ -106,18 +105,15 @@ __all__ = [
     "read_tensor_cloud",
     "read_truth",
     "remove_redundant_points",
-    "save_mesh",
     "save_preview",
     "save_recipe",
     "save_report",
     "save_rig",
     "save_skeleton",
-    "save_tensor_cloud",
     "skeletonize",
     "support",
     "to_line_set",
     "to_pymeshlab",
     "to_recipe",
-    "to_tensor_line_set",
     "to_tubes",
 ]

@@ -6,7 +6,6 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from .errors import InvalidParameterError
-from .interop.clouds import SearchParam, search_parameters
 from .numerics.neighbourhoods import nearest_neighbours, plane_axes, principal
 from .numerics.rings import star_rings
 from .parameters import documented, parameter, resolve_length
@@ -30,10 +29,6 @@ class RingBuilder(Filter[Contraction]):
     The ring of a point is its Delaunay star among its k nearest neighbours, projected on their principal plane. A cloud
     is treated as by ``Sampler(size="all")``.
 
-    `k` may be one of Open3D's search parameters: ``KDTreeSearchParamKNN(knn)`` is ``k=knn``,
-    ``KDTreeSearchParamHybrid(radius, max_nn)`` is ``k=max_nn, radius=radius``, and ``KDTreeSearchParamRadius(radius)``
-    is ``k=30, radius=radius``.
-
     Raises
     ------
     InvalidCloudError
@@ -55,7 +50,7 @@ class RingBuilder(Filter[Contraction]):
 
     consumes: ClassVar[type] = Points
 
-    k: int | Literal["auto", "published"] | SearchParam = parameter(
+    k: int | Literal["auto", "published"] = parameter(
         "auto",
         "Neighbours per point, itself included; at most all. More bridge noise and gaps, fewer keep thin parts apart. "
         "'auto' is 8 to 16 and 'published' 8 to 30, by the number of points.",
@@ -73,19 +68,6 @@ class RingBuilder(Filter[Contraction]):
         low=0,
         open_low=True,
     )
-
-    def __post_init__(self) -> None:
-        # as plain numbers they can be compared, printed and written to files
-        if not isinstance(self.k, (int, str)):
-            given = search_parameters(self.k)
-            if self.radius not in (None, given.get("radius", self.radius)):
-                raise InvalidParameterError(
-                    f"RingBuilder.radius = {self.radius!r}: the {type(self.k).__name__} already has one, "
-                    f"{given['radius']!r}: give radius=None with it"
-                )
-            for name, value in given.items():
-                object.__setattr__(self, name, value)
-        super().__post_init__()
 
     def _run(self, points: Points, watch: Watch | None) -> Contraction:
         cloud = points.cloud[points.survivors]

@@ -32,7 +32,7 @@ branches s.json -o branches.csv
 tree t.json --unit 1 -o cylinders.csv
 grasps s.json --opening 0.3 -o grasps.json
 rig s.json -o rig.glb --cut-loops
-convert s.json s.graphml
+convert s.json s.obj
 edit t.json -o e.json --prune-order 1
 convert t.json t.swc t.glb t.urdf
 evaluate s.json demo/cloud.ply

@@ -1,7 +1,5 @@
 """RingBuilder: cloud -> rings."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.spatial import Delaunay, cKDTree
@@ -91,30 +89,6 @@ def test_order_place_size_and_rotation_do_not_matter():
     for i, (row, closed) in named_rings(RingBuilder()(points[order])).items():
         expected, is_closed = rings[order[i]]
         assert ({*order[row].tolist()}, closed) == ({*expected}, is_closed)
-
-
-# ------------------------------------------------------------------------------------------ Open3D's search parameters
-
-
-def test_open3d_search_parameters_are_plain_numbers_inside():
-    search = pytest.importorskip("open3d").geometry
-    cases = [
-        (RingBuilder(k=search.KDTreeSearchParamKNN(12)), RingBuilder(k=12)),
-        (RingBuilder(k=search.KDTreeSearchParamHybrid(0.5, 20)), RingBuilder(k=20, radius=0.5)),
-        (RingBuilder(k=search.KDTreeSearchParamRadius(0.25)), RingBuilder(k=30, radius=0.25)),
-    ]
-    for given, plain in cases:
-        given.check()
-        assert given == plain
-        assert hash(given) == hash(plain)
-        assert eval(repr(given)) == plain
-    for k, name in ((search.KDTreeSearchParamKNN(2), "k = 2"), (search.KDTreeFlann(), "k = ")):
-        with pytest.raises(InvalidParameterError, match=name):
-            RingBuilder(k=k)(TORUS)
-    hybrid = search.KDTreeSearchParamHybrid(0.5, 20)
-    with pytest.raises(InvalidParameterError, match="radius=None"):  # one of two radii would be lost unsaid
-        RingBuilder(k=hybrid, radius=0.2)
-    assert replace(RingBuilder(k=20), k=hybrid) == replace(RingBuilder(k=hybrid), k=hybrid) == RingBuilder(k=hybrid)
 
 
 def test_radius_limits_the_rings():

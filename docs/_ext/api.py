@@ -50,10 +50,10 @@ NAMES = {
         "Writing and reading": ("save_recipe", "load_recipe", "to_recipe", "from_recipe"),
     },
     "io": {
-        "As Open3D's and pymeshlab's": ("to_line_set", "to_tensor_line_set", "to_tubes", "to_pymeshlab", "annotate"),
-        "Clouds": ("read_cloud", "read_tensor_cloud", "read_sample", "save_tensor_cloud", "annotate_file"),
+        "As Open3D's and pymeshlab's": ("to_line_set", "to_tubes", "to_pymeshlab", "annotate"),
+        "Clouds": ("read_cloud", "read_tensor_cloud", "read_sample", "annotate_file"),
         "Skeletons": ("read_skeleton", "save_skeleton", "read_truth"),
-        "For other programs": ("save_rig", "save_mesh"),
+        "For other programs": ("save_rig",),
     },
     "viewing": {
         "Pictures and pages": ("plot_skeleton", "save_preview", "save_report"),

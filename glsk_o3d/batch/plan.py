@@ -181,7 +181,8 @@ def plan_batch(
 def _endings(formats: Sequence[str], preview: bool) -> list[str]:
     """What is written of each skeleton."""
     try:
-        endings = list(dict.fromkeys(skeleton_ending(Path(), ending) for ending in formats)) + [".png"] * preview
+        names = (Path(f"skeleton.{ending.lstrip('.')}") for ending in formats)
+        endings = list(dict.fromkeys(map(skeleton_ending, names))) + [".png"] * preview
     except FileFormatError as error:
         raise InvalidParameterError(str(error)) from None
     if not endings:

@@ -21,7 +21,6 @@ from .grid import Grid, tile_name, tile_of
 
 PARTS_FOLDER, PARTS_FILE = ".parts", "parts.json"
 MOST_TILES = 10_000  # fitted: more than anybody waits for; each is a file
-_COUNT_WIDTH = 20  # derived: digits of the largest 64-bit number: the header is written before the count is known
 
 
 @dataclass(frozen=True)
@@ -108,7 +107,7 @@ class PartFiles:
                 stream.write(self._header(count))
 
     def _header(self, count: int) -> bytes:
-        return ply.header_of(self._row, count, width=_COUNT_WIDTH)
+        return ply.header_of(self._row, count, width=ply.COUNT_WIDTH)
 
 
 def _divided(path: Path, cut: Cut, of: list[Any], files: PartFiles) -> Split:

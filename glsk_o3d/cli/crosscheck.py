@@ -47,10 +47,6 @@ def crosscheck(
 
 
 def _save_angles(check: Any, path: Path) -> None:
-    from ..interop.packages import import_open3d
-    from ..io.colors import attribute_shades
-    from ..io.scans import save_tensor_cloud
+    from ..io.formats import ply
 
-    marked = import_open3d().t.geometry.PointCloud(check.points)
-    marked.point.angle, marked.point.colors = check.angle[:, None], attribute_shades(check.angle)
-    save_tensor_cloud(marked, path)
+    ply.save(path, {"positions": check.points, "angle": check.angle})

@@ -68,7 +68,7 @@ def convert(
 
 def rig(
     skeleton: SkeletonFile,
-    output: Annotated[Path, output_option("FILE", "The rig: glb, or bvh without surface.")],
+    output: Annotated[Path, output_option("FILE", "The rig: glb.")],
     mesh: Annotated[Path | None, argument("MESH", "A mesh or a cloud; by default the skeleton's tubes.")] = None,
     root: Annotated[Any, root_option("Which joint moves all others")] = None,
     cut_loops: Annotated[bool, Option("--cut-loops", help="Cut loops open; the surface stays whole.")] = False,
@@ -80,10 +80,10 @@ def rig(
     by their branch and move what is next to them. Textures do not go along.
     """
     from .. import FileFormatError, read_cloud, read_skeleton, save_rig
-    from ..io.formats.gltf import RIG_ENDINGS
+    from ..io.formats.gltf import RIG_ENDING
     from ..io.scans import read_mesh
 
-    check_outputs([Output(output, RIG_ENDINGS, "rig is glTF or BVH", save_rig)], skeleton, mesh)
+    check_outputs([Output(output, (RIG_ENDING,), "rig is glTF", save_rig)], skeleton, mesh)
     curve = read_skeleton(skeleton)
     surface: Any = None
     if mesh is not None:

@@ -52,13 +52,12 @@ def _cloud_facts(file: Path, where: str | None) -> dict[str, Any]:
     from ..io.streaming import LARGE_CLOUD
 
     large = (promised_points(file) or 0) > LARGE_CLOUD
-    n, lost, ends, unset = 0, 0, [], []
+    n, lost, ends = 0, 0, []
     known: dict[str, dict[str, Any]] = {}
     for block in read_blocks(file, where=where) if large else [read_scan(file, where)]:
         finite = block.positions[np.isfinite(block.positions).all(axis=1)]
         n, lost = n + len(block), lost + len(block) - len(finite)
         ends += [finite.min(axis=0), finite.max(axis=0)] if len(finite) else []
-        unset.append(block.unset)
         for name, values in block.attributes.items():
             known[name] = _together(known.get(name, {}), values)
     whole: dict[str, Any] = {}
@@ -68,13 +67,12 @@ def _cloud_facts(file: Path, where: str | None) -> dict[str, Any]:
         whole = {"triangles": len(block.triangles) or None, "duplicates": len(finite) - len(distinct)}
         whole["median_spacing"] = float(spacing)  # to the nearest other point
     low, high = (np.min(ends, axis=0), np.max(ends, axis=0)) if ends else (np.full(3, np.nan),) * 2
-    never_set = frozenset.intersection(*unset)
     return {
         **{"kind": "cloud", "points": n, "not_finite": lost},
         **whole,
         **{"lowest": low.tolist(), "highest": high.tolist(), "diagonal": float(np.linalg.norm(high - low))},
         **{"colours": block.colors is not None, "normals": block.normals is not None},
-        "attributes": {name: facts for name, facts in known.items() if name not in never_set} or None,
+        "attributes": known or None,
     }
 
 

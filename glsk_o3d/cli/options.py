@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from typer import Argument, Option
 
-SKELETON_ENDINGS = ["ply", "obj", "json", "npz", "swc", "graphml", "cgal", "vtp", "glb", "urdf"]
+SKELETON_ENDINGS = ["ply", "obj", "json", "npz", "swc", "vtp", "glb", "urdf"]
 """Endings of skeletons; written out, since the table of formats is slow to import."""
 TREE_ENDINGS = ["swc", "glb", "urdf"]
 """Endings of formats that hold only trees."""
@@ -36,10 +36,10 @@ def root_option(help: str) -> Any:
     return option("ROOT", f"{help}: {words}.", parser=place)
 
 
-SkeletonFile = Annotated[Path, argument("SKELETON", "A skeleton in a file: json, npz, ply, obj, swc, graphml or cgal.")]
+SkeletonFile = Annotated[Path, argument("SKELETON", "A skeleton in a file: json, npz, ply, obj or swc.")]
 ScanFile = Annotated[
     Path,
-    argument("SCAN", "A cloud: ply, pcd, csv, txt, asc, xyz, pts, las, laz, e57; or a mesh: off, obj, stl, gltf, glb."),
+    argument("SCAN", "A cloud: ply, pcd, csv, txt, asc, xyz, las, laz, e57; or a mesh: obj, stl."),
 ]
 Where = Annotated[
     str | None, option("CONDITION", "Take only points such as 'classification == 5'; 'glsk info' says what a file has.")

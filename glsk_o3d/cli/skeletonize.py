@@ -25,7 +25,7 @@ def skeletonize(
     pipeline: options.PipelineName = "default",
     settings: options.Settings = None,
     where: options.Where = None,
-    tubes: Annotated[Path | None, option("MESH", "Also write tubes as thick as the object: ply or obj.")] = None,
+    tubes: Annotated[Path | None, option("MESH", "Also write tubes as thick as the object: ply.")] = None,
     labelled: Annotated[
         Path | None, option("CLOUD", "Also write the scan with branch, radius, ... of every point, as ply.")
     ] = None,
@@ -40,11 +40,9 @@ def skeletonize(
     Everything that can be checked is checked before the computation starts. Files appear complete or not at all. Of
     files with more than ten million points only a sample is read.
     """
-    from .. import annotate_file, read_cloud, save_mesh, to_tubes
+    from .. import annotate_file, read_cloud
     from ..interop.packages import require
-    from ..io.meshes import WRITTEN_MESH_ENDINGS
-    from ..io.scans import WRITTEN_CLOUD_ENDING
-    from ..io.streaming import sample_for
+    from ..io.streaming import LABELLED_ENDING, sample_for
     from ..resampling import with_support
     from .overrides import choose
 
@@ -55,8 +53,8 @@ def skeletonize(
 
     results = [
         *skeleton_outputs(output, preview, report, title=scan.name, cut_loops=cut_loops),
-        Output(tubes, WRITTEN_MESH_ENDINGS, "tubes are a mesh", lambda it, path: save_mesh(to_tubes(it), path)),
-        Output(labelled, (WRITTEN_CLOUD_ENDING,), "cloud with labels is PLY", label),
+        Output(tubes, (".ply",), "mesh of tubes is PLY", _save_tubes),
+        Output(labelled, (LABELLED_ENDING,), "cloud with labels is PLY", label),
     ]
     check_outputs(results, scan, Path(pipeline), needed="-o, --tubes or --labelled, a --preview or a --report")
     if tubes is not None or labelled is not None:
@@ -74,6 +72,15 @@ def skeletonize(
     _tell(skeleton, seconds, files)
 
 
+def _save_tubes(skeleton: Skeleton, path: Path) -> None:
+    from .. import to_tubes
+    from ..io.formats import ply
+
+    tubes = to_tubes(skeleton)
+    held = {"positions": tubes.vertices, "normals": tubes.vertex_normals, "colors": tubes.vertex_colors}
+    ply.save(path, held, tubes.triangles)
+
+
 def demo(
     folder: Annotated[Path, output_option("FOLDER", "Made if it is not there.")] = Path("demo"),
     points: Annotated[int, option("N", "How many points the scan has.", "--points", "-n", min=8, max=10**9)] = 8192,
@@ -83,15 +90,13 @@ def demo(
     It is a toy dinosaur with a carrying handle on its back, scanned from two sides. Writes cloud.ply (the scan),
     skeleton.ply, skeleton.json and skeleton.png (the picture to look at).
     """
-    from .. import samples, save_tensor_cloud
-    from ..interop.packages import import_open3d
+    from .. import samples
+    from ..io.formats import ply
 
     if folder.exists() and not folder.is_dir():
         raise NotADirectoryError(f"{folder}: is a file, not a folder")
     folder.mkdir(parents=True, exist_ok=True)
-    o3d = import_open3d()
-    cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(samples.sample_object(points).points))
-    save_tensor_cloud(cloud, folder / "cloud.ply")
+    ply.save(folder / "cloud.ply", {"positions": samples.sample_object(points).points})
     if not (flags.quiet or flags.as_json):
         echo(f"wrote {folder / 'cloud.ply'}")
     outputs = [folder / "skeleton.ply", folder / "skeleton.json"]

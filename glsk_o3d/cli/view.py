@@ -6,9 +6,6 @@ from typing import Annotated
 from .options import argument, option
 from .outputs import check_outputs, skeleton_outputs, tell, write_each
 
-LABELS = ("branch", "label", "classification")
-"""Attributes that are shown where a cloud has no colours: of several the first."""
-
 
 def view(
     file: Annotated[Path, argument("SKELETON|SCAN", "In any format that is read.")],
@@ -18,15 +15,12 @@ def view(
     """Look at a skeleton or a scan in a window.
 
     That needs a display; --preview and --report make files instead. In the window, C, S and T show and hide the cloud,
-    the skeleton, and its tubes of true radius; H helps, Q closes. A scan has its colours there, or else those of its
-    labels, in turn as those of branches; in files it is grey.
+    the skeleton, and its tubes of true radius; H helps, Q closes. A scan has its colours there, and is grey in
+    files.
     """
-    from dataclasses import replace
-
     import numpy as np
 
     from .. import Skeleton, read_skeleton
-    from ..io.colors import attribute_shades
     from ..io.scans import read_scan
     from ..io.skeletons import holds_skeleton
     from ..viewing.window import show
@@ -38,9 +32,6 @@ def view(
         skeleton = read_skeleton(file)
     else:
         scan = read_scan(file)
-        shown = next((name for name in LABELS if name in scan.given and scan.colors is None), None)
-        if shown is not None:
-            scan = replace(scan, colors=attribute_shades(scan.given[shown]))
         cloud, none, n = scan.to_legacy(), np.empty(0), len(scan.positions)
         skeleton = Skeleton(none, none, none, np.full(n, -1), scan.positions, np.full((n, 3), np.nan))
     if preview is None and report is None:

@@ -1,20 +1,19 @@
 """The points of anything that carries points; Open3D is imported when it is first needed, never for an array."""
 
 import os
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from ..errors import InvalidCloudError
 from .packages import import_open3d
 
-__all__ = ["Cloud", "SearchParam", "cloud_points"]
+__all__ = ["Cloud", "cloud_points"]
 
 ACCEPTED = "an Open3D point cloud or triangle mesh (legacy or tensor) or an (N, 3) array of real numbers"
 SAMPLE_COUNT = "sample_count"
 """The attribute of a tensor cloud that says how many points of a larger one each stands for."""
 MOST_COUNTED = np.nextafter(2.0**63, 0)  # derived: the last float that int64 holds
-MOST_NEIGHBOURS = 30  # within a radius without a limit of its own: as many as Open3D's KDTreeSearchParamKNN has
 
 
 class Cloud:
@@ -26,13 +25,6 @@ class Cloud:
     >>> Sampler.consumes is Cloud
     True
     """
-
-
-class SearchParam(Protocol):
-    """Open3D's ``KDTreeSearchParamKNN``, ``KDTreeSearchParamRadius`` or ``KDTreeSearchParamHybrid``."""
-
-    def get_search_type(self) -> Any:
-        """Which of them it is."""
 
 
 def cloud_points(cloud: Any) -> np.ndarray:
@@ -118,21 +110,6 @@ def open3d_class(thing: Any) -> tuple[str, bool]:
         if package == "open3d":
             return cls.__name__, "t" in parts or "core" in parts
     return "", False
-
-
-def search_parameters(given: Any) -> dict[str, Any]:
-    """The number of neighbours ``k``, and ``radius`` if there is one, in Open3D's ``KDTreeSearchParam*``.
-
-    For a radius alone, `k` is `MOST_NEIGHBOURS`. The dict is empty for anything else.
-    """
-    name, _ = open3d_class(given)
-    if name == "KDTreeSearchParamKNN":
-        return {"k": int(given.knn)}
-    if name == "KDTreeSearchParamHybrid":
-        return {"k": int(given.max_nn), "radius": float(given.radius)}
-    if name == "KDTreeSearchParamRadius":
-        return {"k": MOST_NEIGHBOURS, "radius": float(given.radius)}
-    return {}
 
 
 def to_point_cloud(points: np.ndarray) -> Any:

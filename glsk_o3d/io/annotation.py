@@ -88,6 +88,5 @@ def labels(
     for name, values in (("radius", skeleton.radii), ("confidence", skeleton.confidence)):
         found[name] = np.where(vertex >= 0, values[vertex], np.nan)
     if color is not None:
-        colors = shades(skeleton, color, branch, vertex)
-        found["colors"] = np.round(255 * colors).astype(np.uint8)
+        found["colors"] = np.round(255 * shades(skeleton, color, branch, vertex)).astype(np.uint8)
     return found

@@ -14,8 +14,6 @@ ColorChoice: TypeAlias = Literal["branch", "order", "radius", "confidence", "sup
 
 UNKNOWN_GREY = (0.6, 0.6, 0.6)
 COLOR_NAMES = ("branch", "order", "radius", "confidence", "support")
-MOST_LABELS = 1000  # fitted: different whole numbers; intensities are mostly more, branches and trees fewer
-OUTERMOST = 0.02  # fitted: of the points, at either end of a measure
 
 
 def shades(skeleton: Skeleton, color: ColorChoice, branch: np.ndarray, vertices: np.ndarray) -> np.ndarray:
@@ -28,34 +26,15 @@ def shades(skeleton: Skeleton, color: ColorChoice, branch: np.ndarray, vertices:
     if not isinstance(color, str) or color not in COLOR_NAMES:
         return np.tile(as_color(color, f"must be one of {COLOR_NAMES} or three numbers from 0 to 1"), (len(branch), 1))
     if color == "branch":
-        return _in_turn(branch)
+        palette = np.delete(require("matplotlib").colormaps["tab20"].colors, [14, 15], axis=0)  # grey is for none
+        palette = np.concatenate([palette[::2], palette[1::2]])  # the strong ones first
+        return np.where((branch >= 0)[:, None], palette[branch % len(palette)], UNKNOWN_GREY)
     if color == "order":
         order = branch_table(skeleton).order if len(branch) else np.zeros(1, int)
         return _ramp(np.where(branch >= 0, order[branch] / max(order.max(), 1), np.nan))
     vertices = vertices if vertices.ndim == 2 else vertices[:, None]
     values = _of_vertices(skeleton, color)
     return _ramp(np.where((vertices >= 0).all(axis=1), values[vertices].mean(axis=1), np.nan))
-
-
-def attribute_shades(values: np.ndarray) -> np.ndarray:
-    """Colours of what a file says of points, (n,) array: whole numbers are labels and have those of branches.
-
-    So many labels that they are rather measures, and all other numbers, go from dark blue to yellow, but for the
-    `OUTERMOST` at either end, which may be far out. What is negative among labels, or no number, is grey.
-    """
-    labels = values.astype(int) if values.dtype.kind in "iub" else None
-    if labels is not None and len(np.unique(labels)) <= MOST_LABELS:
-        return _in_turn(labels)
-    known = values[np.isfinite(values)].astype(float)
-    low, high = np.quantile(known, [OUTERMOST, 1 - OUTERMOST]) if len(known) else (0.0, 1.0)
-    return _ramp(np.where(np.isfinite(values), np.clip((values - low) / ((high - low) or 1.0), 0, 1), np.nan))
-
-
-def _in_turn(labels: np.ndarray) -> np.ndarray:
-    """The colours of branches, by their numbers; grey for negative ones."""
-    palette = np.delete(require("matplotlib").colormaps["tab20"].colors, [14, 15], axis=0)  # grey is for none
-    palette = np.concatenate([palette[::2], palette[1::2]])  # the strong ones first
-    return np.where((labels >= 0)[:, None], palette[labels % len(palette)], UNKNOWN_GREY)
 
 
 def _ramp(shown: np.ndarray) -> np.ndarray:

@@ -9,9 +9,8 @@ from ..analysis.segmentation import branch_of_edge
 from ..errors import InvalidParameterError
 from ..interop.packages import import_open3d
 from ..numerics.neighbourhoods import plane_axes
-from ..numerics.vectors import TINY, dot, unit
-from ..refinement.sections import measure_sections
-from ..skeleton import OF_VERTICES, Skeleton
+from ..numerics.vectors import TINY
+from ..skeleton import Skeleton
 from .colors import ColorChoice, shades
 
 
@@ -46,49 +45,11 @@ def to_line_set(skeleton: Skeleton, color: ColorChoice = "branch") -> Any:
     return lines
 
 
-def to_tensor_line_set(skeleton: Skeleton, color: ColorChoice | None = None) -> Any:
-    """A skeleton as a tensor line set on the CPU, with all attributes of vertices and edges.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-    color : as of `to_line_set`, optional
-
-    Returns
-    -------
-    open3d.t.geometry.LineSet
-        With ``point.radius``, ``point.confidence``, ``point.half_width``, ``point.half_thickness`` and
-        ``point.support`` (M, 1) float64, ``line.branch`` (E, 1) int32 and, with a color, ``line.colors``.
-
-    Raises
-    ------
-    InvalidParameterError, MissingPackageError
-
-    Examples
-    --------
-    >>> from glsk_o3d import skeletonize
-    >>> from glsk_o3d.samples import torus
-    >>> ring = skeletonize(torus(1000).points)
-    >>> to_tensor_line_set(ring).line.branch.shape[0] == len(ring.edges)
-    True
-    """
-    o3d, branch = import_open3d(), branch_of_edge(skeleton)
-    lines = o3d.t.geometry.LineSet(o3d.core.Tensor(skeleton.vertices), o3d.core.Tensor(skeleton.edges))
-    for name, field in zip(("radius", *OF_VERTICES[1:]), OF_VERTICES, strict=True):
-        lines.point[name] = o3d.core.Tensor(getattr(skeleton, field)[:, None])
-    lines.line["branch"] = o3d.core.Tensor(branch.astype(np.int32)[:, None])
-    if color is not None:
-        shown = shades(skeleton, color, branch, skeleton.edges)
-        lines.line["colors"] = o3d.core.Tensor(np.ascontiguousarray(shown).reshape(-1, 3))
-    return lines
-
-
 def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float | None = None, sides: int = 16) -> Any:
     """A skeleton as a mesh of tubes, one for every branch, closed by half balls.
 
-    Their sections are ellipses with the half axes of the vertices, or circles with their radius if the skeleton has no
-    points to determine the direction of the width. They are linear between vertices, do not twist, and overlap at
-    junctions.
+    Their sections are circles with the radii of the vertices. They are linear between vertices, do not twist, and
+    overlap at junctions.
 
     Parameters
     ----------
@@ -97,7 +58,7 @@ def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float
     color : {"branch", "order", "radius", "confidence", "support"} or three floats in [0, 1]
         What the colours of the branches or vertices show, or the one colour of all.
     radius : float, optional
-        One radius for all, in the cloud's units, instead of the sections of the vertices.
+        One radius for all, in the cloud's units, instead of the radii of the vertices.
     sides : int
         Corners of a cross-section, at least 3.
 
@@ -128,10 +89,7 @@ def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float
     if unknown.any():
         raise InvalidParameterError(f"{unknown.sum()} of {len(radii)} vertices have no radius: give one, radius=...")
     paths = [*skeleton.branches, *np.flatnonzero(skeleton.degree == 0)[:, None]]
-    sections = None
-    if radius is None and len(skeleton.supporting_points):
-        sections = skeleton.half_width, skeleton.half_thickness, measure_sections(skeleton).across
-    vertices, triangles, row = sweep(skeleton.vertices, radii, paths, sides, sections)
+    vertices, triangles, row = sweep(skeleton.vertices, radii, paths, sides)
     flat, branch = np.concatenate([*paths, np.empty(0, int)]), np.repeat(np.arange(len(paths)), list(map(len, paths)))
     o3d = import_open3d()
     mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(vertices), o3d.utility.Vector3iVector(triangles))
@@ -141,15 +99,10 @@ def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float
 
 
 def sweep(
-    vertices: np.ndarray,
-    radii: np.ndarray,
-    paths: Sequence[np.ndarray],
-    sides: int,
-    sections: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None,
+    vertices: np.ndarray, radii: np.ndarray, paths: Sequence[np.ndarray], sides: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Closed surfaces around curves, each a path of vertices: circles swept along them, and half balls at the ends.
 
-    `sections` makes the circles ellipses: half axes, two (M,) arrays, and the unit direction of the first, (M, 3).
     Gives points, (P, 3), triangles, (T, 3), and the row, in the paths one after the other, that each point belongs to.
     """
     if len(paths) == 0:
@@ -172,11 +125,7 @@ def sweep(
     angle = turn[row, None] + np.arange(sides) * 2 * np.pi / sides
     across = np.einsum("rij,jrs->rsi", axes[row], np.stack([np.cos(angle), np.sin(angle)]))
     middle = centre[row] + (radius[row] * np.sin(latitude))[:, None] * tangent[row]
-    width, thickness, wide = sections or (radii, radii, np.zeros_like(vertices))
-    wide = unit(wide[flat] - dot(wide[flat], tangent)[:, None] * tangent)[row]
-    more = (width - thickness)[flat][row, None] * np.einsum("rsi,ri->rs", across, wide)
-    across = thickness[flat][row, None, None] * across + more[:, :, None] * wide[:, None]  # a circle made an ellipse
-    circles = middle[:, None] + np.cos(latitude)[:, None, None] * across
+    circles = middle[:, None] + (radius[row] * np.cos(latitude))[:, None, None] * across
     poles = [centre[end] + sign * radius[end, None] * tangent[end] for end, sign in ((first, -1), (last, 1))]
     points = np.concatenate([circles.reshape(-1, 3), *poles])
 

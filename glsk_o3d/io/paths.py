@@ -14,11 +14,11 @@ import numpy as np
 
 from ..errors import FileFormatError
 
-TEXT_ENDINGS = (".xyz", ".xyzn", ".xyzrgb", ".pts", ".csv", ".txt", ".asc")
+TEXT_ENDINGS = (".xyz", ".csv", ".txt", ".asc")
 """Clouds as text."""
 CLOUD_ENDINGS = (".ply", ".pcd", *TEXT_ENDINGS, ".las", ".laz", ".e57")
 """Files that `read_cloud` reads as clouds."""
-MESH_ENDINGS = (".off", ".obj", ".stl", ".gltf", ".glb")
+MESH_ENDINGS = (".obj", ".stl")
 """Files that `read_cloud` reads as meshes, to take their vertices."""
 SCAN_ENDINGS = CLOUD_ENDINGS + MESH_ENDINGS
 MOST_EXPANDED = 200  # fitted: times the size of a file that its content may take; of skeletons and scans it is 1 to 20
@@ -61,18 +61,12 @@ def check_budget(taken: int, size: int) -> None:
         raise ValueError(f"its {size} bytes would take {taken}, and at most {most} are allowed")
 
 
-def check_line(line: bytes) -> None:
-    """Raise ValueError for a last line without an end: a number that was cut is another number."""
-    if not line.endswith((b"\n", b"\r")):
-        raise ValueError("its last line may be cut inside a number: end it with a line break if it is whole")
-
-
 def text_lines(stream: BinaryIO) -> Iterator[str]:
-    """Lines that are not blank, checked by `check_line`."""
+    """Lines that are not blank; ValueError for a last one without an end: a number that was cut is another number."""
     for line in stream:
         if not line.isspace():
-            if line[-1] != 10:
-                check_line(line)
+            if not line.endswith((b"\n", b"\r")):
+                raise ValueError("its last line may be cut inside a number: end it with a line break if it is whole")
             yield line.decode("ascii", "replace")
 
 

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import ast
-import operator
 import re
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import reduce
 from keyword import iskeyword
 from typing import Any
 
@@ -21,6 +18,11 @@ COLOR_CHANNELS = ["red", "green", "blue"]
 NORMAL_NAMES = ["nx", "ny", "nz"]
 NO_TRIANGLES = np.empty((0, 3), np.int64)
 ALL_ROWS = sys.maxsize  # derived: more than any file has
+_SIGNS: dict[str, Callable[[Any, Any], Any]] = {
+    **{"==": np.equal, "!=": np.not_equal, "<=": np.less_equal, ">=": np.greater_equal},
+    **{"<": np.less, ">": np.greater, "in": np.isin},
+}
+_COMPARISON = r"(\w+)\s*([=!<>]=|[<>]|\bin\b)\s*(.+)"
 
 
 class NoPoints(Exception):
@@ -36,7 +38,6 @@ class Scan:
     normals: np.ndarray | None = None
     attributes: Mapping[str, np.ndarray] = field(default_factory=dict)  # all else; names can stand in an expression
     triangles: np.ndarray = field(default_factory=lambda: NO_TRIANGLES)  # between the points, if it is a mesh
-    unset: frozenset[str] = frozenset()  # attributes that nobody gave: conditions may name them, results leave them out
     single: bool = False  # the file has its places as float32
 
     def __len__(self) -> int:
@@ -58,21 +59,13 @@ class Scan:
         points do not have.
         """
         columns = {**dict(zip("xyz", self.positions.T, strict=True)), **self.attributes}
-        try:
-            chosen = np.asarray(_value(parsed(where), columns))
-        except (TypeError, ValueError) as error:
-            if isinstance(error, InvalidParameterError):
-                raise
-            cure = "write such as 'label in (1, 2)'"
-            raise InvalidParameterError(f"where = {where!r}: cannot be compared: {cure}") from None
-        if chosen.shape != (len(self),) or chosen.dtype != bool:
-            raise InvalidParameterError(f"where = {where!r}: is no condition on points: write such as 'label == 5'")
+        chosen = np.ones(len(self), bool)
+        for name, compare, value in parsed(where):
+            known = f"{name}_" if iskeyword(name) else name
+            if known not in columns:
+                raise InvalidParameterError(did_you_mean(name, columns, "attribute of the points"))
+            chosen &= compare(columns[known], value)
         return chosen
-
-    @property
-    def given(self) -> dict[str, np.ndarray]:
-        """The attributes that are not unset."""
-        return {name: values for name, values in self.attributes.items() if name not in self.unset}
 
     @property
     def shades(self) -> np.ndarray | None:
@@ -97,74 +90,37 @@ class Scan:
             cloud.point.colors = o3d.core.Tensor(shades)
         if self.normals is not None:
             cloud.point.normals = o3d.core.Tensor(np.ascontiguousarray(self.normals, float))
-        for name, values in self.given.items():  # integers as int32 if they fit: Open3D writes no int64
+        for name, values in self.attributes.items():  # integers as int32 if they fit: Open3D writes no int64
             whole = values.dtype.kind in "iub" and np.abs(values.astype(float)).max(initial=0) < 2**31
-            kind = np.int32 if whole else np.float32 if values.dtype == np.float32 else float
+            kind = values.dtype.type if values.dtype in (np.uint8, np.float32) else np.int32 if whole else float
             cloud.point[name] = o3d.core.Tensor(np.ascontiguousarray(values[:, None], kind))
         return cloud
 
 
-# ---------------------------------------------------------------------------------------------------------- conditions
-
-_COMPARISONS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
-    ast.Eq: operator.eq,
-    ast.NotEq: operator.ne,
-    ast.Lt: operator.lt,
-    ast.LtE: operator.le,
-    ast.Gt: operator.gt,
-    ast.GtE: operator.ge,
-    ast.In: np.isin,
-    ast.NotIn: lambda values, among: ~np.isin(values, among),
-}
-_JOINS = {ast.And: np.logical_and, ast.Or: np.logical_or}
-_JOINING = ("and", "or", "not", "in")
-
-
-def parsed(where: str) -> ast.expr:
-    """A condition as a tree of Python's grammar; InvalidParameterError if it is none.
-
-    A word of Python's, such as ``class``, means the attribute that has a ``_`` behind it.
+def parsed(where: str) -> list[tuple[str, Callable[[Any, Any], Any], Any]]:
+    """The comparisons that a condition joins by ``and``: the name of an attribute, how it is compared, and with what
+    number or, behind ``in``, numbers. InvalidParameterError if it is no condition.
     """
-    words = re.sub(r"\b[a-z]+\b", lambda word: word[0] + "_" * (iskeyword(word[0]) and word[0] not in _JOINING), where)
-    try:
-        return ast.parse(words.strip(), mode="eval").body
-    except (SyntaxError, RecursionError, MemoryError) as error:
-        why = getattr(error, "msg", "it is nested too deeply")
-        cure = "write such as 'classification == 5 and not z < 2'"
-        raise InvalidParameterError(f"where = {where[:200]!r}: {why}: {cure}") from None
+    found = []
+    for part in re.split(r"\band\b", where):
+        try:
+            name, sign, words = re.fullmatch(_COMPARISON, part.strip()).groups()  # type: ignore[union-attr]
+            value = [float(word) for word in words.strip("()[]").split(",") if word] if sign == "in" else float(words)
+        except (AttributeError, ValueError):
+            raise InvalidParameterError(
+                f"where = {where[:200]!r}: {part.strip()[:80]!r} is not understood: compare attributes with numbers, "
+                "such as 'classification in (2, 5) and z > 1.5'"
+            ) from None
+        found.append((name, _SIGNS[sign], value))
+    return found
 
 
-def _value(node: ast.AST, columns: Mapping[str, np.ndarray]) -> Any:
-    """What a part of a condition comes to; nothing is let through but comparisons of columns and numbers, joined."""
-    match node:
-        case ast.BoolOp(op=op, values=parts):
-            return reduce(_JOINS[type(op)], [_value(part, columns) for part in parts])
-        case ast.UnaryOp(op=ast.Not(), operand=part):
-            return np.logical_not(_value(part, columns))
-        case ast.UnaryOp(op=ast.USub(), operand=part):
-            return np.negative(_value(part, columns), dtype=float)
-        case ast.Compare(left=left, ops=ops, comparators=rest) if all(type(op) in _COMPARISONS for op in ops):
-            sides = [_value(part, columns) for part in (left, *rest)]
-            pairs = zip(ops, sides, sides[1:], strict=False)
-            return reduce(np.logical_and, [_COMPARISONS[type(op)](a, b) for op, a, b in pairs])
-        case ast.Tuple(elts=parts) | ast.List(elts=parts) | ast.Set(elts=parts):
-            return [_value(part, columns) for part in parts]
-        case ast.Constant(value=int() | float() as number):
-            return number
-        case ast.Name(id=name):
-            if name not in columns:
-                asked = word if iskeyword(word := name.removesuffix("_")) else name
-                raise InvalidParameterError(did_you_mean(asked, columns, "attribute of the points"))
-            return columns[name]
-    raise InvalidParameterError(f"{ast.unparse(node)!r} is not understood: compare attributes with numbers")
-
-
-def scan_of(columns: Mapping[str, np.ndarray], top: float | None = None, unset: bool = False) -> Scan:
+def scan_of(columns: Mapping[str, np.ndarray], top: float | None = None) -> Scan:
     """Points of columns, (N,) arrays by name: places, colours and normals by their names, all else are attributes, by
     names that can stand in an expression, such as ``class_``, ``Scalar_field`` and ``column_7``.
 
     Colours are numbers up to 255 or 65535, or up to 1 if they are no integers; `top` is the brightest in the file if
-    these are only some of its points. What is 0 throughout can be made `unset`.
+    these are only some of its points. Where they are all 0 they are none.
     """
     left = dict(columns)
 
@@ -179,7 +135,7 @@ def scan_of(columns: Mapping[str, np.ndarray], top: float | None = None, unset: 
     if colors is not None:
         top = brightest(colors) if top is None else top
         scale = 1 if top <= 1 and colors.dtype.kind == "f" else 255 if top <= 255 else 65535
-        colors = colors / scale if top or not unset else None
+        colors = colors / scale if top else None
     attributes: dict[str, np.ndarray] = {}
     for text, values in left.items():
         name = re.sub(r"\W+", "_", text).strip("_") or "column"
@@ -192,7 +148,6 @@ def scan_of(columns: Mapping[str, np.ndarray], top: float | None = None, unset: 
         colors,
         None if normals is None else np.ascontiguousarray(normals, float),
         attributes,
-        unset=frozenset(name for name, values in attributes.items() if unset and not values.any()),
         single=columns["x"].dtype.str[1:] == "f4",
     )
 

@@ -1,26 +1,27 @@
-"""Scans from files, clouds and meshes of which the vertices are taken, whole or in blocks; and clouds to files."""
+"""Scans from files, clouds and meshes of which the vertices are taken, whole or in blocks."""
 
 import errno
 import logging
 import os
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 from ..errors import FileFormatError, InvalidCloudError, MissingPackageError, brief
-from ..interop.atomic import check_ending, write_atomically
 from ..interop.packages import import_open3d
-from . import meshes
 from .formats import pcd, ply, scanners, text_tables
 from .paths import MESH_ENDINGS, SCAN_ENDINGS, TEXT_ENDINGS, existing_file, unknown_ending
 from .scan import ALL_ROWS, NoPoints, Scan, parsed
 from .skeletons import holds_skeleton
 
-WRITTEN_CLOUD_ENDING = ".ply"
+FEW_VERTICES = 1000  # fitted: of a mesh; clouds of so few points have hardly a surface
 BLOCK_ROWS = 1_000_000  # measured: larger blocks are not read faster, and take more memory
+_NAMES_MATERIALS = re.compile(rb"((?:^|[\r\n\f\0\\])[ \t]*)m")  # ``mtllib``, also where a line goes on
 _log = logging.getLogger(__name__)
 
 Reader = Callable[[Path, int, bool], tuple[int | None, Iterator[Scan]]]
@@ -33,8 +34,21 @@ def _whole(read: Callable[[Path], Scan]) -> Reader:
     return lambda path, rows, bare: (None, map(read, [path]))  # not read before it is asked for
 
 
+def _vertices(path: Path) -> Scan:
+    """The vertices of an OBJ or STL file, and the triangles between them."""
+    o3d = import_open3d()
+    with TemporaryDirectory() as folder, o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
+        if path.suffix.lower() == ".obj":  # Open3D would read all textures that it names
+            path, whole = Path(folder, "mesh.obj"), path
+            path.write_bytes(_NAMES_MATERIALS.sub(rb"\1#", whole.read_bytes()))
+        mesh = o3d.io.read_triangle_mesh(str(path))
+    colors = np.asarray(mesh.vertex_colors) if mesh.has_vertex_colors() else None
+    normals = np.asarray(mesh.vertex_normals) if mesh.has_vertex_normals() else None
+    return Scan(np.asarray(mesh.vertices), colors, normals, {}, np.asarray(mesh.triangles))
+
+
 _SCAN_READERS: dict[str, Reader] = {
-    **dict.fromkeys(MESH_ENDINGS, _whole(meshes.read_vertices)),
+    **dict.fromkeys(MESH_ENDINGS, _whole(_vertices)),
     **dict.fromkeys(TEXT_ENDINGS, _whole(text_tables.read)),
     **dict.fromkeys((".las", ".laz"), scanners.blocks),
     ".e57": _whole(scanners.read_e57),
@@ -46,17 +60,16 @@ _SCAN_READERS: dict[str, Reader] = {
 def read_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
     """Read a point cloud, or the vertices of a mesh.
 
-    All coordinates keep their digits. A warning is logged for a mesh with large triangles, whose vertices describe the
-    surface badly.
+    All coordinates keep their digits. A warning is logged for a mesh of few vertices, which describe the surface badly.
 
     Parameters
     ----------
     path : path-like
-        PLY, PCD, CSV, TXT, ASC, XYZ, XYZN, XYZRGB, PTS; LAS and LAZ (extra ``las``), E57 (extra ``e57``); or a mesh
-        with triangles as OFF, OBJ, STL, glTF or GLB. In text, lines that hold no point are skipped and logged.
+        PLY, PCD, CSV, TXT, ASC, XYZ; LAS and LAZ (extra ``las``), E57 (extra ``e57``); or a mesh with triangles as
+        OBJ or STL. In text, lines that hold no point are skipped and logged.
     where : str, optional
-        Only points for which this holds, such as ``"classification == 5 and not 0 < z < 2"``: attributes and places,
-        compared with numbers or each other.
+        Only points for which this holds, such as ``"classification in (2, 5) and z > 1.5"``: attributes and places,
+        compared with numbers.
 
     Returns
     -------
@@ -115,28 +128,17 @@ def read_tensor_cloud(path: str | os.PathLike, *, where: str | None = None) -> A
 def read_scan(path: str | os.PathLike, where: str | None = None) -> Scan:
     """Read all that `read_tensor_cloud` does, and the triangles between the points of a mesh if all are taken."""
     scan = next(read_blocks(path, rows=ALL_ROWS, where=where))
-    if _coarse(scan.positions, scan.triangles):
+    if len(scan.triangles) and len(scan) < FEW_VERTICES:
         _log.warning(
-            "%s: the %d vertices of this mesh are far apart, and only vertices count as points: sample its surface "
+            "%s: this mesh has %d vertices, and only vertices count as points: sample its surface "
             "first, for example with Open3D's sample_points_uniformly",
             *(os.fspath(path), len(scan)),
         )
     return scan
 
 
-def _coarse(vertices: np.ndarray, triangles: np.ndarray) -> bool:
-    """Whether triangles with a side of more than a tenth of the diagonal make up half of the surface."""
-    if len(triangles) == 0 or triangles.min() < 0 or triangles.max() >= len(vertices):
-        return False
-    with np.errstate(all="ignore"):  # vertices may be anything
-        sides = vertices[triangles] - vertices[np.roll(triangles, 1, axis=1)]
-        area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-        large = np.linalg.norm(sides, axis=2).max(axis=1) > np.linalg.norm(np.ptp(vertices, axis=0)) / 10
-        return bool(area[large].sum() > area.sum() / 2)
-
-
 def read_mesh(path: str | os.PathLike) -> Any:
-    """Read an Open3D triangle mesh from PLY, OFF, OBJ, STL, glTF or GLB; errors as from `read_cloud`, and
+    """Read an Open3D triangle mesh from PLY, OBJ or STL; errors as from `read_cloud`, and
     FileFormatError for a file without triangles.
     """
     endings = (".ply", *MESH_ENDINGS)
@@ -160,10 +162,9 @@ def read_blocks(
 ) -> Iterator[Scan]:
     """Read a scan a few points at a time, in the order of the file, or positions alone if they are to be `bare`.
 
-    Joined the blocks are the scan, to the last bit; in a block, attributes are unset that are so there. LAS, LAZ, PCD
-    (text and binary) and binary PLY without faces are read in blocks; everything else is one block. With `where` blocks
-    have fewer points, and there is none without. Errors are those of `read_cloud`, before the first block where the
-    size of the file shows that it is truncated.
+    Joined the blocks are the scan, to the last bit. LAS, LAZ, PCD (text and binary) and binary PLY without faces are
+    read in blocks; everything else is one block. With `where` blocks have fewer points, and there is none without.
+    Errors are those of `read_cloud`, before the first block where the size of the file shows that it is truncated.
     """
     if where is not None:
         parsed(where)
@@ -226,33 +227,3 @@ def _chosen(path: Path, blocks: Iterator[Scan], where: str | None) -> Iterator[S
         raise FileFormatError(f"{path}: no points could be read: it is empty, damaged, or not a {ending} file")
     if not chosen:
         raise InvalidCloudError(f"there is no point with {where}")
-
-
-def save_tensor_cloud(cloud: Any, path: str | os.PathLike) -> None:
-    """Write a tensor cloud with all its attributes and all digits, as PLY, which Open3D and `read_tensor_cloud` read.
-
-    Colours become bytes, integers int32 or else doubles, and an attribute of several columns as many properties.
-
-    Parameters
-    ----------
-    cloud : open3d.t.geometry.PointCloud
-    path : path-like
-        Ends in ``.ply``; it appears complete or not at all.
-
-    Raises
-    ------
-    FileFormatError
-        The ending is another.
-    OSError
-        The folder does not exist, or the file cannot be written.
-
-    Examples
-    --------
-    >>> from tempfile import TemporaryDirectory
-    >>> cloud = import_open3d().t.geometry.PointCloud(np.eye(3))
-    >>> with TemporaryDirectory() as folder:
-    ...     save_tensor_cloud(cloud, f"{folder}/cloud.ply")
-    """
-    check_ending(path, "cloud with labels is PLY", WRITTEN_CLOUD_ENDING)
-    data = ply.content(ply.columns_of({name: cloud.point[name].cpu().numpy() for name in cloud.point}))
-    write_atomically(path, lambda temporary: temporary.write_bytes(data))

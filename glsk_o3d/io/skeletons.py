@@ -9,7 +9,6 @@ from typing import NamedTuple
 from ..analysis.comparison import Truth
 from ..errors import FileFormatError, brief
 from ..interop.atomic import write_atomically
-from ..interop.packages import require_for
 from ..refinement.rooted import RootPlace
 from ..skeleton import Skeleton
 from .formats import fields, gltf, lines, ply, trees
@@ -33,8 +32,6 @@ FORMATS: dict[str, Format] = {
     ".json": Format(fields.write_json, fields.read_json),
     ".npz": Format(fields.write_npz, fields.read_npz),
     ".swc": Format(trees.write_swc, trees.read_swc, trees=True),
-    ".graphml": Format(lines.write_graphml, lines.read_graphml),
-    ".cgal": Format(lines.write_cgal, lines.read_cgal),
     ".vtp": Format(lines.write_vtp),
     ".glb": Format(gltf.write, trees=True),
     ".urdf": Format(trees.write_urdf, trees=True),
@@ -51,7 +48,6 @@ def save_skeleton(
     *,
     cut_loops: bool = False,
     root: RootPlace | None = None,
-    format: str | None = None,
 ) -> None:
     """Write a skeleton to a file; the ending chooses the format.
 
@@ -62,14 +58,12 @@ def save_skeleton(
     .ply         vertices, edges, radii, half axes               Open3D (``read_line_set``), MeshLab
     .obj         vertices, edges as ``l`` lines; no radii        MeshLab, Blender, CloudCompare
     .swc         trees, with radii                               neuron and plant tools
-    .graphml     x, y, z, radius of nodes, length of edges       networkx, Gephi, Cytoscape
-    .cgal        a line per branch: count, x y z, ...; no radii  CGAL
     .vtp         vertices, branches, radii, confidence           ParaView, Slicer, vmtk
     .glb         trees, as an armature with a skin of tubes      Blender
     .urdf        trees, as a robot of cylinders and balls        ROS, simulators
     ============ =============================================== =======================================
 
-    Formats below CGAL's are only written, not read. Numbers keep their full precision, except in glTF, which has
+    Formats below SWC are only written, not read. Numbers keep their full precision, except in glTF, which has
     float32. The file appears complete or not at all; after an error an existing file is unchanged.
 
     Parameters
@@ -81,8 +75,6 @@ def save_skeleton(
     root : str, int or (x, y, z), optional
         For the same formats: the root, as for `glsk_o3d.editing.reroot`. By default vertex 0 if the numbers go outwards
         from it, as from `pipelines.tree`; otherwise that of `glsk_o3d.analysis.branch_table`.
-    format : str, optional
-        The ending of another format than that of `path`, with or without its dot.
 
     Raises
     ------
@@ -105,35 +97,31 @@ def save_skeleton(
     0
     """
     path = Path(path)
-    chosen = FORMATS[skeleton_ending(path, format)]
+    chosen = FORMATS[skeleton_ending(path)]
     with holding_all(path):
         data = chosen.write(as_forest(skeleton, cut_loops, root) if chosen.trees else skeleton)
     write_atomically(path, lambda temporary: temporary.write_bytes(data))
 
 
-def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skeleton:
+def read_skeleton(path: str | os.PathLike) -> Skeleton:
     """Read a skeleton from a file that `save_skeleton` or another program wrote.
 
     Parameters
     ----------
     path : path-like
-    format : str, optional
-        As for `save_skeleton`.
 
     Returns
     -------
     Skeleton
         JSON and npz give everything. Other formats give only the graph: `points`, `normals` and `vertex_of_point` are
         empty, and missing radii are NaN. Edges are sorted; repeated edges and those from a vertex to itself are
-        dropped. Polylines are joined at ends with equal coordinates.
+        dropped.
 
     Raises
     ------
     FileNotFoundError
     FileFormatError
         A folder, a cloud, an unknown ending, or a file that is damaged or from a newer release.
-    MissingPackageError
-        Of GraphML, without the extra [graph].
 
     Examples
     --------
@@ -144,13 +132,12 @@ def read_skeleton(path: str | os.PathLike, *, format: str | None = None) -> Skel
     1.0
     """
     path = existing_file(path)
-    if format is None and path.suffix.lower() in {*SCAN_ENDINGS} - FORMATS.keys():
+    if path.suffix.lower() in {*SCAN_ENDINGS} - FORMATS.keys():
         raise _is_cloud(path)
-    ending = skeleton_ending(path, format)
+    ending = skeleton_ending(path)
     read = FORMATS[ending].read
     if read is None:
         raise FileFormatError(f"{path}: {ending} is only written; read are {', '.join(READABLE)}")
-    require_for(ending)
     data = path.read_bytes()
     try:
         return read(data)
@@ -176,15 +163,11 @@ def holds_skeleton(path: str | os.PathLike) -> bool:
     return ending not in SCAN_ENDINGS
 
 
-def skeleton_ending(path: Path, format: str | None = None) -> str:
-    """The ending in the table of formats that a file name has, or that `format` names, with or without its dot.
-
-    FileFormatError if there is none; the message lists them.
-    """
-    ending = path.suffix.lower() if format is None else "." + format.lower().lstrip(".")
-    if ending not in FORMATS:
-        raise unknown_ending(path if format is None else f"format {format!r}", FORMATS)
-    return ending
+def skeleton_ending(path: Path) -> str:
+    """The ending in the table of formats that a file name has; FileFormatError, which lists them, if it has none."""
+    if path.suffix.lower() not in FORMATS:
+        raise unknown_ending(path, FORMATS)
+    return path.suffix.lower()
 
 
 def read_truth(path: str | os.PathLike) -> Truth:

@@ -20,8 +20,9 @@ from ..skeleton import Skeleton
 from .annotation import labels
 from .formats import ply
 from .scan import COLOR_CHANNELS, Scan
-from .scans import WRITTEN_CLOUD_ENDING, promised_points, read_blocks
+from .scans import promised_points, read_blocks
 
+LABELLED_ENDING = ".ply"
 LARGE_CLOUD = 10_000_000  # measured: points that in memory take 2 GB, and in blocks half the time
 
 
@@ -150,7 +151,7 @@ def annotate_file(
     Raises
     ------
     FileFormatError
-        The scan changed during reading, or the output is no PLY file, or is the scan.
+        The output is no PLY file, or is the scan.
     InvalidParameterError
         The skeleton is empty. Other errors are those of `read_cloud`.
     OSError
@@ -166,46 +167,33 @@ def annotate_file(
     ...     annotate_file(skeletonize(torus(1000).points), f"{folder}/scan.xyz", f"{folder}/marked.ply")
     3000
     """
-    check_ending(output, "cloud with labels is PLY", WRITTEN_CLOUD_ENDING)
+    check_ending(output, "cloud with labels is PLY", LABELLED_ENDING)
     if Path(output).exists() and Path(path).exists() and os.path.samefile(path, output):
         raise FileFormatError(f"{os.fspath(output)}: is the scan itself: give another name")
-    if len(skeleton.vertices) == 0:
-        raise InvalidParameterError("the skeleton is empty: there is nothing to label points with")
-    n, names = _survey(path, where)
-    changed = FileFormatError(f"{os.fspath(path)}: has changed while it was read: label it again when it is complete")
+    n = 0
 
     def write(temporary: Path) -> None:
-        written, row = 0, None
+        nonlocal n
+        row = np.dtype([])
         with temporary.open("wb") as stream:
             for block in read_blocks(path, where=where):
-                if not {*names} <= block.attributes.keys():
-                    raise changed
-                points, vertex = vertex_of_cloud(skeleton, block.positions)
-                table = ply.rows_of(_columns(block, names, labels(skeleton, points, vertex, "branch")))
-                if row is None:
-                    stream.write(ply.header_of(table.dtype, n))
-                elif row != table.dtype:
-                    raise changed
-                written, row = written + len(table), table.dtype
+                vertex = vertex_of_cloud(skeleton, block.positions)[1]
+                table = ply.rows_of(_columns(block, labels(skeleton, block.positions, vertex, "branch")))
+                if not n:
+                    row = table.dtype
+                    stream.write(ply.header_of(row, n, width=ply.COUNT_WIDTH))
+                n += len(table)
                 stream.write(table.tobytes())
-        if written != n:
-            raise changed
+            stream.seek(0)
+            stream.write(ply.header_of(row, n, width=ply.COUNT_WIDTH))
 
     write_atomically(output, write)
     return n
 
 
-def _survey(path: str | os.PathLike, where: str | None) -> tuple[int, list[str]]:
-    """How many points there are, and the names of the attributes that some of them have."""
-    n, names = 0, dict[str, None]()
-    for block in read_blocks(path, where=where):
-        n, names = n + len(block), names | dict.fromkeys(block.given)
-    return n, [*names]
-
-
-def _columns(block: Scan, names: list[str], found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _columns(block: Scan, found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Columns of a PLY file, by name: those of a scan, and labels."""
-    held = {"positions": block.positions, **{name: block.attributes[name] for name in names}, **found}
+    held = {"positions": block.positions, **block.attributes, **found}
     if block.normals is not None:
         held["normals"] = block.normals
     if (shades := block.shades) is not None:

@@ -184,7 +184,7 @@ def test_a_large_cloud_is_read_in_blocks(run, rows, tmp_path, monkeypatch, where
 
     points, pipeline = torus(9000).points, pipelines.default().with_options(size=4000, thin_to=2000)
     path = tmp_path / "scan.ply"
-    glsk_o3d.save_tensor_cloud(o3d.t.geometry.PointCloud(o3d.core.Tensor(points)), path)
+    o3d.t.io.write_point_cloud(str(path), o3d.t.geometry.PointCloud(o3d.core.Tensor(points)))
     monkeypatch.setattr(streaming, "LARGE_CLOUD", 8999)
     run(path, formats=["json"], where=where, pipeline=pipeline)
     row = rows()["scan"]

@@ -125,7 +125,7 @@ class TestSamples:
             with pytest.raises(FileFormatError, match=r"manifest\.json: is damaged"):
                 sample(tmp_path / "made", meshes)
         (meshes / "manifest.json").unlink()
-        (meshes / "box.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n")
+        (meshes / "box.obj").write_text("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")
         with pytest.raises(InvalidParameterError, match="'box' is no plain name, or that of two meshes"):
             sample(tmp_path / "made", meshes)
 

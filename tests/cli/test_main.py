@@ -12,7 +12,7 @@ from glsk_o3d import read_cloud, read_skeleton, save_skeleton
 
 
 def test_as_a_process(glsk, scans, tmp_path):
-    names = ["s.ply", "s.json", "s.npz", "s.obj", "s.graphml", "s.cgal"]
+    names = ["s.ply", "s.json", "s.npz", "s.obj"]
     outputs = [word for name in names for word in ("-o", name)]
     run = glsk("skeletonize", scans / "sample.ply", *outputs, "--preview", "s.png")
     assert (run.returncode, run.stderr) == (0, "")

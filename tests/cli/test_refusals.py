@@ -23,7 +23,7 @@ TABLE = """
     1 convert o.ply a.swc                                  | a.swc: this format holds trees only
     2 convert o.ply a.nope                                 | a.nope: the file is a skeleton and its name ends in
     2 convert y.ply                                        | nothing to write: give a FILE, or -o FILE
-    2 rig none.ply -o r.fbx                                | r.fbx: the rig is glTF or BVH and its name ends in .glb
+    2 rig none.ply -o r.fbx                                | r.fbx: the rig is glTF and its name ends in .glb
     1 rig y.ply y.ply -o r.glb                             | y.ply: is a skeleton, not a scan
     1 rig y.ply junk.ply -o r.glb                          | junk.ply: not a valid .ply file: it does not start with
     1 rig y.ply nan.xyz -o r.glb                           | nan.xyz: the surface has points that are not finite: drop
@@ -55,7 +55,7 @@ BEFORE_ANY_RUN = """
     2 skeletonize SCANS/ring.ply -o s.stl                  | s.stl: the file is a skeleton and its name ends in .ply or
     2 skeletonize SCANS/ring.ply --preview s.jpg           | s.jpg: the picture is a PNG and its name ends in .png
     2 skeletonize SCANS/ring.ply --report s.pdf            | s.pdf: the report is a page and its name ends in .html
-    2 skeletonize SCANS/ring.ply --tubes s.xyz             | s.xyz: the tubes are a mesh and its name ends in .ply or
+    2 skeletonize SCANS/ring.ply --tubes s.xyz             | s.xyz: the mesh of tubes is PLY and its name ends in .ply
     2 skeletonize SCANS/ring.ply --labelled s.pcd          | s.pcd: the cloud with labels is PLY and its name ends
     2 skeletonize SCANS/ring.ply -o s.ply -o ./s.ply       | s.ply: is named twice
     2 skeletonize SCANS/ring.ply -o SCANS/ring.ply         | is an input

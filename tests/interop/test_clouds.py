@@ -31,12 +31,14 @@ def clouds(o3d):
         yield "tensor mesh", mesh, dtype
 
 
-def test_open3d_clouds_give_their_points_as_float64(o3d):
-    for name, cloud, dtype in clouds(o3d):
-        points = cloud_points(cloud)
-        assert points.dtype == np.float64, name
-        assert points.flags.c_contiguous, name
-        np.testing.assert_array_equal(points, XYZ.astype(dtype), err_msg=name)
+def test_open3d_clouds_give_a_copy_of_their_points_as_float64(o3d):
+    for name, cloud, dtype in (*clouds(o3d), ("array", XYZ, np.float64)):
+        for _ in range(2):
+            points = cloud_points(cloud)
+            assert points.dtype == np.float64, name
+            assert points.flags.c_contiguous, name
+            np.testing.assert_array_equal(points, XYZ.astype(dtype), err_msg=name)
+            points += 1
 
 
 def test_arrays_and_array_likes_of_real_numbers(o3d):
@@ -52,18 +54,6 @@ def test_arrays_and_array_likes_of_real_numbers(o3d):
     assert np.isnan(cloud_points([[np.nan, 0, 0]])[0, 0])
 
 
-def test_result_is_a_copy(o3d):
-    given = XYZ.copy()
-    given.setflags(write=False)
-    points = cloud_points(given)
-    assert points.flags.writeable
-    assert not np.shares_memory(points, given)
-    for name, cloud, _ in clouds(o3d):
-        first = cloud_points(cloud)
-        first += 1
-        np.testing.assert_allclose(cloud_points(cloud), XYZ, atol=1e-6, err_msg=name)
-
-
 @pytest.mark.parametrize(
     "cloud",
     [
@@ -75,19 +65,14 @@ def test_result_is_a_copy(o3d):
     ids=lambda cloud: type(cloud).__name__,
 )
 def test_what_is_no_cloud_is_refused(cloud):
-    with pytest.raises(InvalidCloudError):
+    with pytest.raises(InvalidCloudError, match=r"read_cloud" if isinstance(cloud, str) else "cloud"):
         cloud_points(cloud)
 
 
-def test_refusals_say_what_was_given_and_what_is_accepted(tmp_path, o3d):
-    with pytest.raises(InvalidCloudError, match=r"ndarray.*\(9, 2\).*float64.*\(N, 3\) array"):
-        cloud_points(XYZ[:, :2])
-    with pytest.raises(InvalidCloudError, match=r"glsk_o3d\.read_cloud"):
-        cloud_points(tmp_path / "scan.ply")
-    with pytest.raises(InvalidCloudError, match="Open3D LineSet"):
-        cloud_points(o3d.geometry.LineSet())
-    with pytest.raises(InvalidCloudError, match="Open3D LineSet"):
-        cloud_points(o3d.t.geometry.LineSet())
+def test_other_geometries_are_refused(o3d):
+    for geometries in (o3d.geometry, o3d.t.geometry):
+        with pytest.raises(InvalidCloudError, match=r"Open3D LineSet is no cloud: give .* \(N, 3\) array"):
+            cloud_points(geometries.LineSet())
 
 
 def test_empty_clouds_are_refused(o3d):

@@ -20,13 +20,13 @@ from glsk_o3d.samples import y_junction
 points = y_junction(600).points
 skeleton = glsk.skeletonize(points)
 from glsk_o3d.io.skeletons import FORMATS, READABLE
-for ending in FORMATS.keys() - {".graphml"}:
+for ending in FORMATS:
     glsk.save_skeleton(skeleton, f"s{ending}", cut_loops=True)
     if ending in READABLE:
         glsk.read_skeleton(f"s{ending}")
 glsk.save_recipe(glsk.pipelines.default(), "r.json")
 assert glsk.load_recipe("r.json") == glsk.pipelines.default()
-skeleton.to_line_set(), glsk.to_tensor_line_set(skeleton), glsk.to_tubes(skeleton, (1, 0, 0))
+skeleton.to_line_set(), glsk.to_tubes(skeleton, (1, 0, 0))
 glsk.annotate(skeleton, points, color=(1, 0, 0))
 table = glsk.analysis.branch_table(skeleton)
 table.to_csv("branches.csv"), str(table), glsk.analysis.grasp_candidates(skeleton, 1.0)
@@ -37,13 +37,10 @@ from pathlib import Path
 from glsk_o3d.crosscheck import cross_check
 for ending in ("las", "laz", "e57"):
     Path(f"scan.{ending}").write_bytes(b"any")
-Path("s.graphml").write_bytes(b"<graphml/>")
 asking = {
     "preview": lambda: glsk.save_preview(skeleton, "s.png"),
     "report": lambda: glsk.save_report(skeleton, "s.html"),
     "graph": skeleton.to_networkx,
-    "graphml": lambda: glsk.save_skeleton(skeleton, "s.graphml"),
-    "read graphml": lambda: glsk.read_skeleton("s.graphml"),
     "plot": lambda: glsk.plot_skeleton(skeleton),
     "colours": lambda: glsk.to_line_set(skeleton, "branch"),
     "crosscheck": lambda: cross_check(points),
@@ -64,9 +61,8 @@ print(json.dumps(said))
 """
 NAMED = {
     **dict.fromkeys(("preview", "report", "plot", "colours", "batch"), "pictures"),
-    **dict.fromkeys(("graph", "graphml", "read graphml"), "graph"),
     **{"las": "las", "laz": "las", "e57": "e57"},
-    **{name: name for name in ("crosscheck", "meshlab", "cluster")},
+    **{name: name for name in ("graph", "crosscheck", "meshlab", "cluster")},
 }
 
 

@@ -1,9 +1,7 @@
 """Fixtures for files: a cloud of Open3D, and what it means that a skeleton comes back."""
 
-import networkx
 import numpy as np
 import pytest
-from networkx.algorithms.isomorphism import categorical_node_match
 
 from glsk_o3d.io.formats.fields import ARRAYS, dumps
 
@@ -38,15 +36,3 @@ def assert_identical():
         assert dumps(back.report.to_dict()) == dumps(skeleton.report.to_dict())
 
     return check
-
-
-@pytest.fixture(scope="session")
-def isomorphic():
-    """Whether two skeletons have the same positions (and radii) joined in the same way."""
-
-    def same(a, b, radii):
-        graphs = [skeleton.to_networkx() for skeleton in (a, b)]
-        keys = ["position", "radius"] if radii else ["position"]
-        return networkx.is_isomorphic(*graphs, node_match=categorical_node_match(keys, [None] * len(keys)))
-
-    return same

@@ -5,7 +5,7 @@ import open3d as o3d
 import pytest
 
 import glsk_o3d as glsk
-from glsk_o3d import InvalidParameterError, annotate, samples
+from glsk_o3d import annotate, samples
 from glsk_o3d.analysis import branch_table, segment
 
 POINTS = samples.y_junction(800).points
@@ -93,8 +93,3 @@ def test_colours(cloud, skeleton):
     shown = annotate(skeleton, cloud, color="branch").point.colors.numpy()
     assert shown.dtype == np.uint8
     assert len(np.unique(np.column_stack([shown, segment(skeleton)]), axis=0)) == len(np.unique(shown, axis=0)) == 3
-    brightness = annotate(skeleton, cloud, color="radius").point.colors.numpy() @ [0.2, 0.7, 0.1]
-    radius = skeleton.radii[skeleton.vertex_of_point]
-    assert brightness[radius.argmin()] < brightness[radius.argmax()]
-    with pytest.raises(InvalidParameterError, match="color"):
-        annotate(skeleton, cloud, color="size")

@@ -1,16 +1,16 @@
-"""Skeletons as line sets, and as tubes: closed, outward, as thick as they should be."""
+"""Skeletons as line sets, in colours, and as tubes: closed, outward, as thick as they should be."""
 
 from dataclasses import replace
 
 import numpy as np
-import open3d as o3d
 import pytest
 
-from glsk_o3d import InvalidParameterError, Skeleton, samples, skeletonize, to_line_set, to_tensor_line_set, to_tubes
-from glsk_o3d.io.colors import COLOR_NAMES
+from glsk_o3d import InvalidParameterError, Skeleton, samples, to_line_set, to_tubes
+from glsk_o3d.analysis import branch_table
+from glsk_o3d.io.colors import COLOR_NAMES, UNKNOWN_GREY, shades
 from glsk_o3d.io.geometry import sweep
-from glsk_o3d.refinement.sections import measure_sections
-from glsk_o3d.skeleton import OF_VERTICES
+
+BRANCH, VERTICES = np.array([0, 1, -1]), np.array([0, 5, -1])
 
 
 def graph(vertices, edges, radii):
@@ -21,7 +21,7 @@ def axis_of(sample):
     return graph(sample.nodes, sample.edges, sample.radii)
 
 
-# ----------------------------------------------------------------------------------------------------------- line sets
+# ----------------------------------------------------------------------------------------------- line sets and colours
 
 
 def test_a_line_set_has_its_own_copy_of_the_graph(skeleton):
@@ -39,38 +39,37 @@ def test_in_colour_without_edges(count, color):
     lone = Skeleton(np.zeros((count, 3)), (), np.ones(count), (), (), (), confidence=np.ones(count))
     lines = to_line_set(lone, color)
     assert (len(lines.points), len(lines.lines), len(lines.colors)) == (count, 0, 0)
-    assert to_tensor_line_set(lone, color).line.colors.shape == (0, 3)
     assert len(to_tubes(lone, color).vertex_colors) == len(to_tubes(lone, color).vertices)
 
 
-def test_line_sets_in_colour():
-    branched = skeletonize(samples.y_junction(800).points)
-    for color, distinct in (("branch", 3), ((0.1, 0.2, 0.3), 1), ("radius", None), ("confidence", None)):
-        legacy = np.asarray(to_line_set(branched, color).colors)
-        count = len(np.unique(legacy, axis=0))
-        assert count == distinct if distinct else count > 5
-    bare = graph(branched.vertices, branched.edges, np.full(len(branched.radii), np.nan))
-    for color in ("radius", "confidence"):
-        assert (np.asarray(to_line_set(bare, color).colors) == 0.6).all()
+@pytest.mark.parametrize("color", COLOR_NAMES)
+def test_what_belongs_to_nothing_or_is_not_known_is_grey(tree, color):
+    shown = shades(tree, color, BRANCH, VERTICES)
+    assert shown.shape == (3, 3)
+    np.testing.assert_array_equal(shown[2], UNKNOWN_GREY)
+    assert ((shown >= 0) & (shown <= 1)).all()
+    unknown = replace(tree, radii=np.full(6, np.nan), confidence=np.full(6, np.nan), support=np.full(6, np.nan))
+    if color not in ("branch", "order"):
+        assert (shades(unknown, color, BRANCH, VERTICES) == UNKNOWN_GREY).all()
 
 
-def test_a_tensor_line_set_has_all_attributes():
-    branched = skeletonize(samples.y_junction(800).points)
-    lines = to_tensor_line_set(branched)
-    assert isinstance(lines, o3d.t.geometry.LineSet)
-    expected = {"positions": branched.vertices, "radius": branched.radii[:, None]}
-    expected |= {name: getattr(branched, name)[:, None] for name in OF_VERTICES[1:]}
-    assert set(lines.point) == expected.keys()
-    for name, values in expected.items():
-        assert lines.point[name].dtype == o3d.core.float64
-        np.testing.assert_array_equal(lines.point[name].numpy(), values)
-    np.testing.assert_array_equal(lines.line.indices.numpy(), branched.edges)
-    for path, branch in zip(branched.branches, range(3), strict=True):
-        assert (lines.line.branch.numpy()[np.isin(branched.edges, path).all(axis=1)] == branch).all()
-    assert "colors" not in lines.line
-    for color in ("branch", "radius", (0.1, 0.2, 0.3)):
-        shown = to_tensor_line_set(branched, color).line.colors.numpy()
-        np.testing.assert_array_equal(shown, np.asarray(to_line_set(branched, color).colors))
+def test_branches_differ_orders_go_up_and_values_are_means_over_vertices(tree):
+    assert len(np.unique(shades(tree, "branch", np.arange(18), np.zeros(18, int)), axis=0)) == 18
+    pairs = np.array([[0, 0], [5, 5]])
+    by_radius = [shades(tree, "radius", BRANCH[:2], vertices) for vertices in (pairs, VERTICES[:2])]
+    np.testing.assert_array_equal(*by_radius)
+    order = branch_table(tree).order
+    shown = shades(tree, "order", np.arange(len(order)), np.zeros(len(order), int))
+    dark, light = (np.unique(shown[order == each], axis=0) for each in (0, 1))
+    assert len(dark) == len(light) == 1
+    assert dark.sum() < light.sum()
+
+
+def test_one_colour_for_all_and_what_is_none(tree):
+    np.testing.assert_array_equal(shades(tree, (0, 0.5, 1), BRANCH, VERTICES), [[0, 0.5, 1]] * 3)
+    for wrong in ("size", (1, 0), (0, 0, 2), ("a", 0, 0), np.nan):
+        with pytest.raises(InvalidParameterError, match=r"color = .*'radius'"):
+            shades(tree, wrong, BRANCH, VERTICES)
 
 
 # --------------------------------------------------------------------------------------------------------------- tubes
@@ -129,20 +128,6 @@ def test_a_helix_of_wire_has_its_volume_and_does_not_twist():
     step = np.linalg.norm(np.diff(across, axis=0), axis=1)
     turned = np.linalg.norm(np.diff(spring.vertices[1:-1], axis=0), axis=1) / 0.3
     assert (step < 1.1 * turned).all()
-
-
-def test_tubes_of_a_flat_bar_are_flat(flat_bar):
-    bar = flat_bar(0.4, 0.2)
-    sections = measure_sections(bar)
-    bar = replace(bar, half_width=sections.half_width, half_thickness=sections.half_thickness)
-    mesh = to_tubes(bar, sides=32)
-    assert mesh.is_watertight()
-    assert np.abs(np.asarray(mesh.vertices)).max(axis=0) == pytest.approx([0.4, 0.2, 2 + 0.3])
-    round_bar = replace(bar, half_width=None, half_thickness=None)
-    bare = replace(bar, vertex_of_point=(), points=(), normals=())  # nobody knows where the width is
-    for other in (round_bar, bare):
-        points = np.asarray(to_tubes(other, sides=32).vertices)
-        np.testing.assert_array_equal(points, sweep(bar.vertices, bar.radii, bar.branches, 32)[0])
 
 
 def test_sharp_turns_and_coincident_vertices():

@@ -11,8 +11,6 @@ from glsk_o3d.io.skeletons import FORMATS, READABLE, holds_skeleton, read_skelet
 from glsk_o3d.report import Report
 from glsk_o3d.skeleton import Skeleton
 
-WITH_RADII = (".ply", ".graphml")
-
 
 @st.composite
 def random_skeletons(draw):
@@ -34,16 +32,14 @@ def random_skeletons(draw):
 
 @given(skeleton=random_skeletons())
 @settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
-def test_random_graphs_through_every_format(assert_identical, isomorphic, skeleton):
+def test_random_graphs_through_every_format(assert_identical, skeleton):
     for ending in (".json", ".npz"):
         assert_identical(FORMATS[ending].read(FORMATS[ending].write(skeleton)), skeleton)
-    for ending in (".ply", ".obj", ".graphml", ".cgal"):
+    for ending in (".ply", ".obj"):
         back = FORMATS[ending].read(FORMATS[ending].write(skeleton))
-        assert isomorphic(back, skeleton, ending in WITH_RADII)
-        if ending != ".cgal":
-            np.testing.assert_array_equal(back.vertices, skeleton.vertices)
-            np.testing.assert_array_equal(back.edges, skeleton.edges)
-        assert ending in WITH_RADII or np.isnan(back.radii).all()
+        np.testing.assert_array_equal(back.vertices, skeleton.vertices)
+        np.testing.assert_array_equal(back.edges, skeleton.edges)
+        np.testing.assert_array_equal(back.radii, skeleton.radii if ending == ".ply" else np.nan)
         assert np.isnan(back.confidence).all()
         assert len(back.points) == len(back.normals) == len(back.vertex_of_point) == 0
     tree = FORMATS[".swc"].read(FORMATS[".swc"].write(as_forest(skeleton, True, None)))
@@ -62,7 +58,7 @@ def test_broken_off_files(tree, tmp_path, ending):
             back = read_skeleton(path)
         except FileFormatError:
             continue
-        assert ending in (".obj", ".swc", ".cgal"), "only a format of independent lines can end anywhere"
+        assert ending in (".obj", ".swc"), "only a format of independent lines can end anywhere"
         assert len(back.vertices) <= len(tree.vertices)
 
 
@@ -83,8 +79,6 @@ def test_saving_twice_gives_the_same_bytes_and_what_is_only_written_is_not_read(
 
 PLY = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n"
 DAMAGED = {
-    ".cgal": ["2 0 0 0 1 1\n", "0\n", "1.5 0 0 0 1 1\n"],
-    ".graphml": ["<graphml/>", "<html><p>"],
     ".json": ["[]", "[" * 100_000, "{"],
     ".npz": ["PK"],
     ".obj": ["v 1 2\n", "v 1 2 three\n", *(f"v 1 2 3\nv 4 5 6\nl {line}\n" for line in ("0 1", "1 3", "1 -3"))],
@@ -93,7 +87,7 @@ DAMAGED = {
         *("1 0 0 0 0 1\n", "1 0 0 0 0 1 nan\n2 0 0 0 0\n"),
     ],
     ".ply": [
-        PLY + "end_header\n1 2 3\n4 5\n",
+        *(PLY + f"end_header\n1 2 3\n{row}\n" for row in ("4 5", "4 five 6")),
         PLY + "element edge 1\nproperty int vertex1\nproperty int vertex2\nend_header\n1 2 3\n4 5 6\n0 2\n",
         PLY.replace("ascii", "binary_little_endian") + "end_header\nabc",
         PLY.replace("ascii", "klingon") + "end_header\n",
@@ -117,16 +111,11 @@ def test_damaged_files(tmp_path, ending):
 
 def test_endings(tree, tmp_path, assert_identical):
     for name in ("s.vtk", "s", "s.txt"):
-        with pytest.raises(FileFormatError, match=r"\.ply.*\.obj.*\.json.*\.cgal"):
+        with pytest.raises(FileFormatError, match=r"\.ply.*\.obj.*\.json.*\.urdf"):
             save_skeleton(tree, tmp_path / name)
-    with pytest.raises(FileFormatError, match="format 'vtk'"):
-        save_skeleton(tree, tmp_path / "s.ply", format="vtk")
     assert not list(tmp_path.iterdir())
     save_skeleton(tree, tmp_path / "S.JSON")
     assert_identical(read_skeleton(tmp_path / "S.JSON"), tree)
-    for format in ("npz", ".NPZ"):
-        save_skeleton(tree, tmp_path / "s.bak", format=format)
-        assert_identical(read_skeleton(tmp_path / "s.bak", format=format), tree)
 
 
 @pytest.mark.parametrize("ending", [".ply", ".obj"])

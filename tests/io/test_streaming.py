@@ -12,10 +12,7 @@ from glsk_o3d import (
     pipelines,
     read_cloud,
     read_sample,
-    read_skeleton,
     read_tensor_cloud,
-    save_skeleton,
-    save_tensor_cloud,
     skeletonize,
 )
 from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
@@ -159,28 +156,6 @@ def test_labels_are_those_of_annotate(scans, skeleton, tmp_path, ending, where):
         np.testing.assert_array_equal(found.scan_green.numpy()[:, 0], cloud.point.colors.numpy()[:, 1])
 
 
-def test_a_skeleton_without_its_cloud(ring, tmp_path):
-    scan, marked = tmp_path / "scan.ply", tmp_path / "marked.ply"
-    save_tensor_cloud(annotate(ring), scan)
-    save_skeleton(ring, tmp_path / "ring.ply")
-    bare = read_skeleton(tmp_path / "ring.ply")
-    annotate_file(bare, scan, marked)
-    found, expected = read_tensor_cloud(marked).point, annotate(bare, torus(1000).points).point
-    np.testing.assert_array_equal(found.skeleton_vertex.numpy(), expected.skeleton_vertex.numpy())
-
-
-def test_an_attribute_that_is_unset_in_early_blocks(ring, tmp_path):
-    laspy, n = pytest.importorskip("laspy"), 30000
-    data = laspy.LasData(laspy.LasHeader(point_format=0, version="1.2"))
-    data.x, data.y, data.z = 100 * torus(n).points.T
-    data.classification = np.arange(n) > 25000
-    data.write(tmp_path / "c.las")
-    annotate_file(ring, tmp_path / "c.las", tmp_path / "out.ply")
-    found = read_tensor_cloud(tmp_path / "out.ply").point
-    np.testing.assert_array_equal(found.classification.numpy()[:, 0], data.classification)
-    assert "intensity" not in found
-
-
 WORDS = {"f4": "float", "f8": "double", "u1": "uchar", "i1": "char", "u2": "ushort", "i4": "int", "u4": "uint"}
 
 
@@ -218,25 +193,6 @@ def test_a_scan_that_breaks_off_leaves_nothing_behind(scans, ring, tmp_path, end
     with pytest.raises(FileFormatError, match=path.name):
         annotate_file(ring, path, tmp_path / "out.ply")
     assert [*tmp_path.iterdir()] == [path]
-
-
-@pytest.mark.parametrize("change", ["more points", "no classification"])
-def test_a_scan_that_changes_meanwhile_leaves_nothing_behind(scans, ring, tmp_path, monkeypatch, change):
-    cloud = read_tensor_cloud(scans / "scan.ply")
-    path, survey = tmp_path / "scan.ply", streaming._survey
-    save_tensor_cloud(cloud, path)
-
-    def changes_then(*given):
-        found = survey(*given)
-        if change == "no classification":
-            del cloud.point["classification"]
-        save_tensor_cloud(cloud.append(cloud) if change == "more points" else cloud.select_by_index([*range(99)]), path)
-        return found
-
-    monkeypatch.setattr(streaming, "_survey", changes_then)
-    with pytest.raises(FileFormatError, match=r"scan\.ply: has changed while it was read"):
-        annotate_file(ring, path, tmp_path / "out.ply")
-    assert [each.name for each in tmp_path.iterdir()] == ["scan.ply"]
 
 
 def test_what_is_refused_before_reading(scans, ring, tmp_path):

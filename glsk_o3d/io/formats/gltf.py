@@ -6,7 +6,6 @@ numbers are float32, as glTF's are; of coordinates as on a map the large part is
 
 import json
 import os
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,18 +15,16 @@ from ...analysis.segmentation import vertex_of_cloud
 from ...errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ...interop.atomic import check_ending, write_atomically
 from ...interop.clouds import cloud_points, open3d_class
-from ...interop.packages import import_open3d
 from ...numerics.vectors import norm, unit
 from ...refinement.rooted import RootPlace
 from ...skeleton import Skeleton
 from ..geometry import to_tubes
-from . import bvh
 from .graphs import as_forest, global_shift, holding_all
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942  # published: glTF 2.0, 4.4
 COMPONENT_TYPES = {"f4": 5126, "u2": 5123, "u4": 5125}  # published: glTF 2.0, 3.6.2.2
 POINTS_MODE, TRIANGLES_MODE = 0, 4  # published: glTF 2.0, 5.24
-RIG_ENDINGS = (".glb", ".bvh")
+RIG_ENDING = ".glb"
 MOST_JOINTS = 65535  # published: glTF 2.0, 3.7.3.3, in which joints are counted in 16 bits at most
 # derived: float32 holds its parts, and they sum to 1 exactly: else far from the origin points move
 WEIGHT_STEPS = 2**16
@@ -44,7 +41,7 @@ def save_rig(
     root: RootPlace | None = None,
     up: str = "z",
 ) -> Skeleton:
-    """Write a mesh or a cloud with a skeleton's armature that moves it, as glTF; or the armature alone, as BVH.
+    """Write a mesh or a cloud with a skeleton's armature that moves it, as glTF.
 
     Joints are the junctions, the places where limbs leave a junction's ball, and vertices between that are a radius
     apart or more. Each edge between joints is a bone, which turns about the end nearer to the root.
@@ -53,7 +50,7 @@ def save_rig(
     ----------
     skeleton : Skeleton
     path : path-like
-        Ends in ``.glb``, or in ``.bvh``: a hierarchy and one frame, at rest, in the cloud's units.
+        Ends in ``.glb``.
     mesh : triangle mesh or cloud, optional
         Of Open3D, or anything that carries points. By default the skeleton's tubes, or if it has no radii, its points.
     cut_loops : bool
@@ -74,7 +71,7 @@ def save_rig(
         The skeleton has loops, or no edges; or the ending is another.
     InvalidCloudError
     InvalidParameterError
-        There is no such axis; or there is a mesh for BVH, which holds none.
+        There is no such axis.
 
     Examples
     --------
@@ -87,15 +84,12 @@ def save_rig(
     >>> len(bones.edges) < len(body.edges)
     True
     """
-    check_ending(path, "rig is glTF or BVH", *RIG_ENDINGS)
-    alone = Path(path).suffix.lower() == ".bvh"
+    check_ending(path, "rig is glTF", RIG_ENDING)
     if up not in UPRIGHT:
         raise InvalidParameterError(f"up = {up!r}: must be one of {', '.join(UPRIGHT)}")
-    if alone and mesh is not None:
-        raise InvalidParameterError("a .bvh file holds no surface: leave the mesh out, or write .glb")
     with holding_all(path):
         bones = armature(_with_edges(as_forest(skeleton, cut_loops, root)))
-        data = bvh.content(bones, up) if alone else _content(bones, _surface(skeleton) if mesh is None else mesh, up)
+        data = _content(bones, _surface(skeleton) if mesh is None else mesh, up)
     write_atomically(path, lambda temporary: temporary.write_bytes(data))
     return bones
 
@@ -123,6 +117,7 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
     """The content of a GLB file."""
     if len(forest.edges) > MOST_JOINTS:
         raise FileFormatError(f"glTF counts at most {MOST_JOINTS} bones, not {len(forest.edges)}: simplify it first")
+    mesh = mesh.to_legacy() if open3d_class(mesh) in (("PointCloud", True), ("TriangleMesh", True)) else mesh
     points = cloud_points(mesh)
     if not np.isfinite(points).all():
         raise InvalidCloudError("the surface has points that are not finite: drop them first")
@@ -143,9 +138,7 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
         **{name: buffer.add(values, "f4", "VEC3") for name, values in _looks(mesh, len(points)).items()},
     }
     primitive: dict[str, Any] = {"attributes": attributes, "mode": POINTS_MODE}
-    (kind, tensor), triangles = open3d_class(mesh), np.empty((0, 3))
-    if kind == "TriangleMesh":
-        triangles = mesh.triangle.indices.cpu().numpy() if tensor else np.asarray(mesh.triangles)
+    triangles = np.asarray(mesh.triangles) if open3d_class(mesh)[0] == "TriangleMesh" else np.empty((0, 3))
     if len(triangles):
         primitive |= {"indices": buffer.add(triangles.reshape(-1), "u4", "SCALAR"), "mode": TRIANGLES_MODE}
     x, y, z = origin.tolist()
@@ -169,17 +162,14 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
 
 def _looks(mesh: Any, n: int) -> dict[str, np.ndarray]:
     """Normals and colours, where there is one of each vertex; colours are linear in glTF."""
-    kind, tensor = open3d_class(mesh)
-    if kind not in ("PointCloud", "TriangleMesh"):
-        return {}
-    geometry = mesh if tensor else getattr(import_open3d().t.geometry, kind).from_legacy(mesh)
-    held, found = geometry.vertex if kind == "TriangleMesh" else geometry.point, {}
-    looks = {name: held[name].cpu().numpy() for name in ("normals", "colors") if name in held and len(held[name]) == n}
-    if "normals" in looks and (norm(looks["normals"]) > 0).all():
-        found["NORMAL"] = unit(looks["normals"])
-    if "colors" in looks:
-        shades = looks["colors"] / 255 if looks["colors"].dtype == np.uint8 else looks["colors"]
-        found["COLOR_0"] = np.where(shades <= SRGB_KNEE, shades / 12.92, ((shades + 0.055) / 1.055) ** 2.4)
+    kind, found = open3d_class(mesh)[0], {}
+    if kind in ("PointCloud", "TriangleMesh"):
+        of_vertices = "" if kind == "PointCloud" else "vertex_"
+        normals, shades = (np.asarray(getattr(mesh, f"{of_vertices}{name}")) for name in ("normals", "colors"))
+        if len(normals) == n and (norm(normals) > 0).all():
+            found["NORMAL"] = unit(normals)
+        if len(shades) == n:
+            found["COLOR_0"] = np.where(shades <= SRGB_KNEE, shades / 12.92, ((shades + 0.055) / 1.055) ** 2.4)
     return found
 
 

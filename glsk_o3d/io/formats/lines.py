@@ -1,15 +1,11 @@
-"""OBJ, GraphML, CGAL's polylines and VTP: vertices and edges, or branches, to the last bit; no cloud, no report.
+"""OBJ and VTP: vertices and edges, or branches, to the last bit; no cloud, no report.
 
-OBJ has edges as ``l`` lines, and no radii; scans are OBJ files, too, and a skeleton is one that has lines. GraphML has
-x, y, z and radius of the nodes and the length of every edge. CGAL's text has a line per branch, the number of its
-points and then x y z of each; on reading, polylines are joined where their ends have equal coordinates. VTP, VTK's
+OBJ has edges as ``l`` lines, and no radii; scans are OBJ files, too, and a skeleton is one that has lines. VTP, VTK's
 polydata, has the radii and confidences too, and the cell array ``branch`` counts the polylines. A vertex without edges
-is a polyline of one point, or a point.
+is a point.
 """
 
 import base64
-import io
-import math
 from collections.abc import Iterable
 from itertools import pairwise
 from typing import BinaryIO
@@ -17,12 +13,10 @@ from xml.etree import ElementTree as xml
 
 import numpy as np
 
-from ...interop.packages import require
 from ...skeleton import Skeleton
 from .graphs import NoEdges, graph_skeleton, line, text, words_by_line
 
 _OBJ_MARK = b"# curve skeleton written by glsk-o3d"
-_KEYS = ("x", "y", "z", "radius")
 _VTK_TYPES = {"f": "Float64", "i": "Int64"}
 
 
@@ -58,55 +52,6 @@ def read_obj(data: bytes) -> Skeleton:
     if not (edges or data.startswith(_OBJ_MARK)):
         raise NoEdges
     return graph_skeleton(vertices, edges)
-
-
-def write_graphml(skeleton: Skeleton) -> bytes:
-    """The content of a GraphML file."""
-    networkx = require("networkx")
-    graph = networkx.Graph()
-    table = np.column_stack([skeleton.vertices, skeleton.radii]).tolist()
-    graph.add_nodes_from((i, dict(zip(_KEYS, row, strict=True))) for i, row in enumerate(table))
-    edges = zip(*skeleton.edges.T.tolist(), skeleton.edge_lengths.tolist(), strict=True)
-    graph.add_weighted_edges_from(edges, weight="length")
-    stream = io.BytesIO()
-    networkx.write_graphml_xml(graph, stream)
-    return stream.getvalue()
-
-
-def read_graphml(data: bytes) -> Skeleton:
-    """The skeleton in the content of a GraphML file."""
-    networkx = require("networkx")
-    graph = networkx.read_graphml(io.BytesIO(data))
-    lost = [node for node, facts in graph.nodes(data=True) if not {"x", "y", "z"} <= facts.keys()]
-    if lost:
-        raise ValueError(f"node {lost[0]!r} lacks x, y or z")
-    index = {node: i for i, node in enumerate(graph)}
-    rows = [[facts.get(key, math.nan) for key in _KEYS] for _, facts in graph.nodes(data=True)]
-    table = np.array(rows, float).reshape(-1, 4)
-    return graph_skeleton(table[:, :3], [(index[a], index[b]) for a, b in graph.edges()], table[:, 3])
-
-
-def write_cgal(skeleton: Skeleton) -> bytes:
-    """The content of a file of CGAL's polylines."""
-    paths = [*skeleton.branches, *np.flatnonzero(skeleton.degree == 0)[:, None]]
-    return text(line(len(path), *skeleton.vertices[path].ravel().tolist()) for path in paths)
-
-
-def read_cgal(data: bytes) -> Skeleton:
-    """The skeleton in the content of a file of CGAL's polylines."""
-    lines = [[float(word) for word in words] for words in words_by_line(data)]
-    if not lines or any(len(numbers) != 1 + 3 * numbers[0] or numbers[0] < 1 for numbers in lines):
-        raise ValueError("a line must hold the number of its points and then x y z of each")
-    points = np.concatenate([numbers[1:] for numbers in lines]).reshape(-1, 3)
-    stop = np.cumsum([int(numbers[0]) for numbers in lines])
-    start = np.r_[0, stop[:-1]]
-    inner = np.setdiff1d(np.arange(len(points)), stop - 1)  # those with a next point on their line
-    ends = np.concatenate([start, stop - 1])[np.tile(stop - start > 1, 2)]
-    _, first, which = np.unique(points[ends], axis=0, return_index=True, return_inverse=True)
-    label = np.arange(len(points))
-    label[ends] = ends[first][which.ravel()]
-    kept, index = np.unique(label, return_inverse=True)
-    return graph_skeleton(points[kept], index[np.column_stack([inner, inner + 1])])
 
 
 def write_vtp(skeleton: Skeleton) -> bytes:

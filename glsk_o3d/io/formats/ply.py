@@ -17,7 +17,9 @@ from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ...interop.atomic import write_atomically
 from ...skeleton import Skeleton
 from ..paths import check_promised, number_rows, text_lines
 from ..scan import COLOR_CHANNELS, NO_TRIANGLES, NORMAL_NAMES, Scan, scan_of
@@ -26,6 +28,7 @@ from .graphs import NoEdges, graph_skeleton
 SECTION = ("half_width", "half_thickness")
 LONGEST_LINE = 1 << 16  # derived: far beyond any line of a header, so that an endless file without lines ends
 LONGEST_HEADER = 1 << 12  # derived: in lines, likewise
+COUNT_WIDTH = 20  # derived: digits of the largest 64-bit number: a header may be written before the count is known
 MORE_THAN_PROMISED = "it holds more than its header promises"
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _KINDS = {
@@ -153,14 +156,14 @@ def read_tables(stream: BinaryIO, *wanted: str) -> dict[str, Table]:
     else:
         lines = text_lines(stream)
         for element in elements:
-            tables[element.name] = text_table(lines, element)
+            tables[element.name] = _text(lines, element)
         rest = next(lines, "").encode()
     if rest and sum(element.rows > 0 for element in elements) > 1:  # then a wrong count shifts what comes after it
         raise ValueError(MORE_THAN_PROMISED)
     return {name: table for name, table in tables.items() if name in wanted}
 
 
-def text_table(lines: Iterator[str], element: Element) -> Table:
+def _text(lines: Iterator[str], element: Element) -> Table:
     """The next rows of text as a table."""
     if element.has_lists:
         return _row_by_row(element, map(_words, islice(lines, element.rows)))
@@ -324,17 +327,22 @@ def content(columns: Mapping[str, np.ndarray], triangles: np.ndarray | None = No
     return header_of(vertices.dtype, len(vertices), more=more) + vertices.tobytes() + faces.tobytes()
 
 
-def columns_of(held: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Columns of the types that Open3D reads, of arrays, (n,) or (n, k), by the names that its clouds have."""
+def save(path: Path, held: Mapping[str, ArrayLike], triangles: ArrayLike | None = None) -> None:
+    """Write points with what `columns_of` takes, and triangles between them, as `write_atomically` does."""
+    data = content(columns_of(held), triangles if triangles is None else np.asarray(triangles))
+    write_atomically(path, lambda temporary: temporary.write_bytes(data))
+
+
+def columns_of(held: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
+    """Columns of the types that Open3D reads, of arrays, (n,) or (n, 3), by the names that its clouds have."""
     columns: dict[str, np.ndarray] = {}
-    for name, values in held.items():
+    for name, given in held.items():
+        values = np.asarray(given)
         if name == "colors" and values.dtype.kind == "f":
             values = np.round(255 * np.clip(values, 0, 1)).astype(np.uint8)
         elif values.dtype.str[1:] not in WRITTEN_KINDS:
             values = values.astype(np.int32 if np.can_cast(values.dtype, np.int32) else float)
-        values = values.reshape(len(values), -1)
-        names = [f"{name}_{i}" for i in range(values.shape[1])] if values.shape[1] > 1 else [name]
-        columns |= dict(zip(_PROPERTIES.get(name, names), values.T, strict=True))
+        columns |= dict(zip(_PROPERTIES.get(name, [name]), values.reshape(len(values), -1).T, strict=True))
     return columns
 
 

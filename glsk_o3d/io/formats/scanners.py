@@ -24,7 +24,7 @@ _E57_BYTES = 32  # derived: of a point with all that is read of it
 
 
 def blocks(path: Path, rows: int, bare: bool) -> tuple[int, Iterator[Scan]]:
-    """What is 0 in all of a block is unset in it."""
+    """The number of points, and the points, in blocks of so many."""
     require_for(path.suffix)
     size = path.stat().st_size
     with path.open("rb") as stream:
@@ -81,7 +81,7 @@ def _blocks(path: Path, rows: int, bare: bool) -> Iterator[Scan]:
             names = [] if bare else [name for name in file.header.point_format.dimension_names if name not in "XYZ"]
             columns = {name: np.asarray(points[name]) for name in ("x", "y", "z", *names)}
             columns = {name: values for name, values in columns.items() if values.ndim == 1}
-            yield scan_of(columns, top, unset=True)
+            yield scan_of(columns, top)
 
 
 def _opened(path: Path, parts: str = "all") -> Any:

@@ -1,12 +1,10 @@
-"""Clouds as text: CSV, TXT, ASC, PTS and the XYZ family, with or without a line of names; all numbers are kept.
+"""Clouds as text: CSV, TXT, ASC and XYZ, with or without a line of names; all numbers are kept.
 
 The columns are parted by spaces, tabs, commas or semicolons, and lines ahead of the first three numbers are a header.
-Without names the columns after z are what the ending says.
 """
 
 import logging
 import math
-import os
 import re
 from array import array
 from contextlib import suppress
@@ -16,8 +14,7 @@ from typing import NamedTuple, TextIO
 
 import numpy as np
 
-from ..paths import check_line, check_promised
-from ..scan import COLOR_CHANNELS, NORMAL_NAMES, NoPoints, Scan, scan_of
+from ..scan import NoPoints, Scan, scan_of
 
 _log = logging.getLogger(__name__)
 
@@ -31,13 +28,7 @@ _ROLES = {
     **dict.fromkeys(("r", "red", "rf"), "red"),
     **dict.fromkeys(("g", "green", "gf"), "green"),
     **dict.fromkeys(("b", "blue", "bf"), "blue"),
-    **{name: name for name in NORMAL_NAMES},
     **{f"{word}{mark}{axis}": f"n{axis}" for word in ("normal", "n") for mark in ("_", "") for axis in "xyz"},
-}
-_BY_ENDING = {
-    ".xyzn": [*"xyz", *NORMAL_NAMES],
-    ".xyzrgb": [*"xyz", *COLOR_CHANNELS],
-    ".pts": [*"xyz", "intensity", *COLOR_CHANNELS],
 }
 
 
@@ -65,14 +56,7 @@ def read(path: Path) -> Scan:
         layout = _layout(stream)
         stream.seek(0)
         rows = _rows(stream, layout, path)
-    ending = path.suffix.lower()
-    if ending == ".pts":
-        _check_count(path, len(rows))
-    known = _BY_ENDING.get(ending, [*"xyz"])
-    if ending == ".pts" and len(layout.columns) == 6:
-        known = [*"xyz", *COLOR_CHANNELS]
-    others = (f"column_{column + 1}" for column in layout.columns[len(known) :])
-    names = layout.names or [*known, *others][: len(layout.columns)]
+    names = layout.names or [*"xyz", *(f"column_{column + 1}" for column in layout.columns[3:])]
     columns: dict[str, np.ndarray] = {}
     for name, values in zip(names, rows.T, strict=True):
         role = name if _role(name) in columns else _role(name)
@@ -80,17 +64,6 @@ def read(path: Path) -> Scan:
             role += "_2"
         columns[role] = values if role in _ROLES.values() else _whole(values)
     return scan_of(columns)
-
-
-def _check_count(path: Path, held: int) -> None:
-    """ValueError where a PTS file has less points than its first line says, or may be cut in the last."""
-    with path.open("rb") as stream:
-        first = stream.readline(64).strip()
-        stream.seek(-1, os.SEEK_END)
-        check_line(stream.read())
-    if not first.isdigit():
-        raise ValueError("its first line is not the number of points")
-    check_promised(int(first), held)
 
 
 def _layout(stream: TextIO) -> Layout:

@@ -70,16 +70,6 @@ def test_what_makes_no_sense(tree, tmp_path, changes, says):
 # ----------------------------------------------------------------------------------------------------------------- npz
 
 
-def test_npz_is_plain_and_what_is_no_part_of_it_is_not_read(tree, tmp_path):
-    save_skeleton(tree, tmp_path / "s.npz")
-    with np.load(tmp_path / "s.npz", allow_pickle=False) as archive:
-        assert archive["format"] == "glsk-o3d skeleton"
-        np.testing.assert_array_equal(archive["vertices"], tree.vertices)
-    with zipfile.ZipFile(tmp_path / "s.npz", "a") as packed:
-        packed.writestr("more.npy", b"no array")
-    np.testing.assert_array_equal(read_skeleton(tmp_path / "s.npz").vertices, tree.vertices)
-
-
 def test_npz_never_unpickles_nor_fills_the_memory(tree, tmp_path):
     class Bomb:
         def __reduce__(self):

@@ -1,11 +1,9 @@
-"""OBJ, GraphML, CGAL's text, VTP in VTK: as others write them, and as others read ours."""
+"""OBJ and VTP: as others write them, and as others read ours."""
 
-import networkx
 import numpy as np
 import pytest
 
 from glsk_o3d import save_skeleton
-from glsk_o3d.errors import FileFormatError
 from glsk_o3d.io.skeletons import read_skeleton
 
 
@@ -29,29 +27,6 @@ def test_obj_as_others_write_it(tmp_path):
     back = read_skeleton(tmp_path / "s.obj")
     np.testing.assert_array_equal(back.vertices, [[0, 0, 0], [1, 0, 0], [2, 0, 0]])
     np.testing.assert_array_equal(back.edges, [[0, 1], [0, 2], [1, 2]])
-
-
-def test_graphml_of_others_and_in_networkx(tree, tmp_path):
-    graph = networkx.MultiDiGraph()
-    graph.add_nodes_from([("a", dict(x=0, y=0.5, z=1)), ("b", dict(x=1.0, y=1.0, z=1.0, radius=2.0))])
-    graph.add_edges_from([("b", "a"), ("a", "b"), ("a", "a")])
-    networkx.write_graphml_xml(graph, tmp_path / "s.graphml")
-    back = read_skeleton(tmp_path / "s.graphml")
-    np.testing.assert_array_equal(back.edges, [[0, 1]])
-    np.testing.assert_array_equal(back.radii, [np.nan, 2])
-    save_skeleton(tree, tmp_path / "s.graphml")
-    graph = networkx.read_graphml(tmp_path / "s.graphml", node_type=int)
-    assert [graph.nodes[i]["radius"] for i in range(6)] == tree.radii.tolist()
-    assert [graph.edges[edge]["length"] for edge in tree.edges.tolist()] == tree.edge_lengths.tolist()
-    networkx.write_graphml_xml(networkx.path_graph(2), tmp_path / "s.graphml")
-    with pytest.raises(FileFormatError, match=r"node '0'.* x, y or z"):
-        read_skeleton(tmp_path / "s.graphml")
-
-
-def test_polylines_have_a_line_per_branch(tree, forest, tmp_path):
-    for skeleton, counts in ((tree, [2, 3, 3]), (forest, [1, 2, 3])):
-        save_skeleton(skeleton, tmp_path / "s.cgal")
-        assert sorted(int(line.split()[0]) for line in (tmp_path / "s.cgal").read_text().splitlines()) == counts
 
 
 def test_vtk_reads_vertices_branches_and_radii(skeleton, tmp_path):

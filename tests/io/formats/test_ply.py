@@ -15,6 +15,7 @@ CODES = {"uchar": "B", "int": "i", "float": "f", "double": "d", "ushort": "H"}
 FORMATS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 XYZ = ["double x", "double y", "double z"]
 FACE = ["list uchar int vertex_indices"]
+PLACES = "property float x\nproperty float y\nproperty float z\n"
 SQUARE = [(0.0, 0.0, 0.5), (1.0, 0.0, 0.5), (1.0, 1.0, 0.5), (0.0, 1.0, 0.5)]
 all_formats = pytest.mark.parametrize("format", FORMATS)
 
@@ -174,6 +175,8 @@ def test_a_file_that_ends_anywhere_before_its_tables_do_is_refused(scan, format,
         ("element vertex 2\nproperty float x\nproperty float y\n", "no x, y and z"),
         ("element vertex 2\nproperty list float int x\n", "has the line"),
         ("element vertex 2\n", "m.ply"),
+        (f"element vertex 1\n{PLACES}element face 40\nproperty list uchar int vertex_indices\n", "40 rows of 'face'"),
+        (f"element vertex 0\n{PLACES}", "no points could be read"),
         ("element face 1\nproperty list uchar int vertex_indices\n", "no element 'vertex'"),
         ("comment \n" * 9999, "does not end"),
         ("comment " + "x" * 100_000 + "\n", "has the line"),
