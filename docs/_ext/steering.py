@@ -11,9 +11,9 @@ FILES = (
     *("points", "sampler", "outlier_remover", "denoiser", "thinner", "ring_builder"),
     *("contractor", "lpr_reducer", "stopping", "connector", "refiner", "tracer", "decisions"),
 )
-ORIGINS = ("published", "derived", "measured", "fitted", "speed", "warning")
-"""Where numbers come from. Those for speed, such as the sizes of blocks, change no result, and those of warnings only
-what is said about one."""
+ORIGINS = ("published", "derived", "measured", "fitted", "speed", "precision", "warning")
+"""Where numbers come from. Those for speed, such as the sizes of blocks, change no result, those of precision none when
+they are finer, and those of warnings only what is said about one."""
 ORIGIN = re.compile(rf"\b({'|'.join(ORIGINS)})\b", re.IGNORECASE)
 
 

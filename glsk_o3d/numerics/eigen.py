@@ -10,7 +10,7 @@ import numpy as np
 
 from .vectors import FULL, TINY, unit
 
-# measured: distance of two eigenvalues over their spread, below which the closed form is not exact enough
+# precision: distance of two eigenvalues over their spread, below which the closed form is not exact enough
 EIGENVALUES_APART = 1e-3
 
 

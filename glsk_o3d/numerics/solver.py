@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array, csr_matrix
 from scipy.sparse.linalg import SuperLU, splu
 
-# measured
+# precision
 SOLVE_TOLERANCE = 1e-7  # of the cloud's size; refinement ends here
 SOLVE_ACCEPTABLE = 1e-4  # of the cloud's size; a solve that stalls above this is refused
 MAX_REFINEMENTS = 6

@@ -23,7 +23,7 @@ FAR_OUT = 20.0  # fitted: half widths beyond which a protrusion says no more; of
 LEAST_OUT = 0.3  # fitted: half widths below which a protrusion says no more
 BESIDE = 2.0  # fitted: half widths from the curve to where nothing is beside a limb
 OUTER_PLACES = np.linspace(1 / 3, 1, 5)  # measured: of the length; each but the first and last is asked
-ACROSS = 16  # measured: directions across a branch; eight are enough for flat parts
+ACROSS = 16  # precision: directions across a branch; eight are enough for flat parts
 
 
 def prune_spurs(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Decision]]:

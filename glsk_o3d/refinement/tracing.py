@@ -11,7 +11,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
-from ..numerics.groups import component_labels, group_median, group_sum
+from ..numerics.groups import component_labels, group_median
 from ..numerics.near_links import join_pieces, linked, slice_centres, steps
 from ..numerics.polylines import incident_edges, nearest_on_edges
 from ..numerics.vectors import dot, norm, unit
@@ -26,7 +26,6 @@ COVER_SCALES = 1.2  # radius around a path in which points need no path of their
 COVER_RADII = 1.3  # the same over the radius of a part with a surface
 JOIN_SCALES = 8.0  # longest gap that is none, over s
 LEAST_PIECE = 3  # smaller groups of points, farther than that from all others, are left out
-SMOOTHING_PASSES = 2  # in which every vertex of a path becomes the mean of itself and its neighbours
 MEETING_SCALES, MEETING_COSINE = 2.0, 0.8  # how near over s, and how straight ahead of each other, two tips meet
 
 
@@ -174,10 +173,6 @@ def _assembled(skeleton: Skeleton, mixed: _Mixed, paths: _Paths, tree: bool) -> 
     degree, point = np.bincount(edges.ravel(), minlength=len(nodes)), nodes < mixed.n
     inner = (point & (degree > 1))[:, None]
     vertices = np.where(inner, paths.centre[nodes], mixed.places[nodes])
-    ends, others = np.concatenate([edges, edges[:, ::-1]]).T
-    for _ in range(SMOOTHING_PASSES):
-        around = vertices + group_sum(vertices[others], ends, len(nodes))
-        vertices = np.where(inner, around / (1 + degree)[:, None], vertices)
     if not tree:
         edges = np.concatenate([edges, _meetings(vertices, edges, point & (degree == 1), mixed.scale)])
     index = np.full(len(skeleton.vertices), -1)

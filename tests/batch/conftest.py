@@ -2,9 +2,11 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from collections import Counter
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -141,7 +143,10 @@ def start(tmp_path):
     def begin(*words) -> subprocess.Popen:
         command = [sys.executable, "-m", "glsk_o3d", "batch", *map(str, words)]
         pipe = subprocess.PIPE
-        process = subprocess.Popen(command, cwd=tmp_path, stdout=pipe, stderr=pipe, text=True, start_new_session=True)
+        heard = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # in the background of a script it is ignored
+        process = subprocess.Popen(
+            command, cwd=tmp_path, stdout=pipe, stderr=pipe, text=True, start_new_session=True, preexec_fn=heard
+        )
         begun.append(process)
         return process
 

@@ -81,7 +81,7 @@ BEFORE_ANY_RUN = """
     1 batch none -o out                                    | none: no such file or folder
     2 batch SCANS/ring.ply -o out --format stl             | unknown ending; known are .ply
     2 batch SCANS/ring.ply -o out --format ,               | nothing to write
-    2 batch SCANS/ring.ply -o out --workers 2 --scheduler tcp://x:1 | give neither workers
+    2 batch SCANS/ring.ply -o out --workers 2 --scheduler tcp://x:1 | scheduler: the cluster has its own workers
 """
 
 
