@@ -16,7 +16,6 @@ from .points import Points
 OUTLIER_ROUNDS = 6  # since what is left of a cluster stands out once the rest is gone
 DENSEST_HOPS = 4  # from neighbour to neighbour, within which the densest place is looked for
 FLOATING_RATIO = 5.0  # times as far from its neighbours as points there are: not for a surface that is only uneven
-DENSE_QUANTILE = 0.05  # of the distances to neighbours: how near points are where they are dense
 FLOATING_SHARE = 0.1  # of all points that can float at most; more are a part of the object
 LIMB_NEIGHBOURS = 64  # among points far from theirs, that a limb of an object is longer than thick with
 # least second and third over first principal spread of points that fill space
@@ -82,7 +81,7 @@ def inliers(
         # as near as the neighbours would be if all were there
         mean = distance[:, 1:].mean(axis=1) / np.sqrt(weight[left].take(neighbours).mean(axis=1))
         found = local_outlier_ratio(mean, neighbours) > factor
-        if (mean > FLOATING_RATIO * np.quantile(mean, DENSE_QUANTILE)).any():
+        if mean.max() > FLOATING_RATIO * mean.min():  # else none can float
             found |= in_floating_cluster(points[left], weight[left], mean, neighbours)
         keep = np.flatnonzero(~found)
         if len(keep) == len(left) or len(keep) < least:
