@@ -137,7 +137,7 @@ class Pipeline(Generic[Produced]):
     RingBuilder(k=12, ...) | Contractor(...) | Connector(radius='3%', ...)
     """
 
-    def __init__(self, *stages: Filter) -> None:
+    def __init__(self, *stages: Filter[Any]) -> None:
         if not stages:
             raise InvalidParameterError("a pipeline needs at least one filter")
         for stage in stages:
@@ -157,7 +157,7 @@ class Pipeline(Generic[Produced]):
         *,
         on_iteration: OnIteration | None = None,
         on_state: OnState | None = None,
-        on_stage: Callable[[Filter], object] | None = None,
+        on_stage: Callable[[Filter[Any]], object] | None = None,
     ) -> Produced:
         """Run all filters on a cloud.
 
@@ -275,7 +275,7 @@ class Pipeline(Generic[Produced]):
         return hash(self.stages)
 
 
-def parts(item: Pipeline | Parameters) -> Iterator[Parameters]:
+def parts(item: Pipeline[Any] | Parameters) -> Iterator[Parameters]:
     """Everything with parameters in a pipeline: its filters, and after each the reducer and the rule inside."""
     if isinstance(item, Pipeline):
         inner: Iterable[Any] = item.stages
@@ -306,7 +306,7 @@ def with_filters(report: Report, other: Report) -> Report:
     return dataclasses.replace(report, stages=other.stages, recipe=other.recipe, seconds=other.seconds)
 
 
-def with_stage(report: Report, stage: Filter, seconds: float) -> Report:
+def with_stage(report: Report, stage: Filter[Any], seconds: float) -> Report:
     """A report with one more filter in it."""
     name, table = type(stage).__name__, stage.table()
     if report.stop_reason == STOPPED_BY_CALLER:

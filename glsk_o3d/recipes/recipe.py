@@ -17,7 +17,7 @@ RECIPE_ENDING = ".json"
 """Of files that hold recipes."""
 
 
-def to_recipe(pipeline: Pipeline) -> dict[str, Any]:
+def to_recipe(pipeline: Pipeline[Any]) -> dict[str, Any]:
     """A pipeline as a recipe, with every parameter in it.
 
     Parameters
@@ -47,7 +47,7 @@ def to_recipe(pipeline: Pipeline) -> dict[str, Any]:
     return recipe
 
 
-def save_recipe(pipeline: Pipeline, path: str | os.PathLike) -> None:
+def save_recipe(pipeline: Pipeline[Any], path: str | os.PathLike[str]) -> None:
     """Write a pipeline as a recipe, with every parameter in it, as JSON.
 
     Parameters
@@ -74,12 +74,12 @@ def save_recipe(pipeline: Pipeline, path: str | os.PathLike) -> None:
     write_json(path, to_recipe(pipeline))
 
 
-def _check_ending(path: str | os.PathLike) -> None:
+def _check_ending(path: str | os.PathLike[str]) -> None:
     if Path(path).suffix.lower() != RECIPE_ENDING:
         raise RecipeError(f"{os.fspath(path)}: unknown ending; recipes are {RECIPE_ENDING} files")
 
 
-def load_recipe(path: str | os.PathLike) -> Pipeline:
+def load_recipe(path: str | os.PathLike[str]) -> Pipeline[Any]:
     """Read a pipeline from a recipe.
 
     Parameters
@@ -119,7 +119,7 @@ def load_recipe(path: str | os.PathLike) -> Pipeline:
         raise RecipeError(f"{os.fspath(path)}: {error}") from None
 
 
-def from_recipe(recipe: dict[str, Any]) -> Pipeline:
+def from_recipe(recipe: dict[str, Any]) -> Pipeline[Any]:
     """The pipeline that a recipe describes.
 
     Parameters
