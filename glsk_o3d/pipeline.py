@@ -192,7 +192,8 @@ class Pipeline(Generic[Produced]):
                 report = with_stage(with_filters(data.report, report), stage, seconds)
                 data = dataclasses.replace(data, report=report)
         warn(message for message in report.warnings if message not in told)
-        return data
+        produced: Produced = data
+        return produced
 
     def check_complete(self) -> None:
         """Raise InvalidParameterError unless the pipeline leads from a cloud to a skeleton."""
@@ -228,7 +229,7 @@ class Pipeline(Generic[Produced]):
         >>> thin.stages[4].k, thin.stages[5].reducer, thin.stages[6].radius
         (12, None, '2%')
         """
-        pipeline: Any = self
+        pipeline: Pipeline[Produced] = self
         names: dict[tuple[type[Parameters], str], str] = {}
         given = [*(options or {}).items(), *named.items()]
         # a reducer or a rule is put in, or taken out, before its parameters change

@@ -199,7 +199,7 @@ def _places_on(skeleton: Skeleton, path: np.ndarray, spacing: float | None) -> n
         reach = np.minimum(reach, length / 4)
     before, behind = np.clip([at - reach, at + reach], *((-np.inf, np.inf) if closed else (0, length)))
     chord = sample(behind) - sample(before)
-    size = np.linalg.norm(chord[:, :3], axis=1, keepdims=True)
+    size: np.ndarray = np.linalg.norm(chord[:, :3], axis=1, keepdims=True)
     axis = np.divide(chord[:, :3], size, out=np.full((count, 3), np.nan), where=size > 0)
     apart = behind - before
     slope = np.divide(chord[:, 3], apart, out=np.zeros(count), where=apart > 0)

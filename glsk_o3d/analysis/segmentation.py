@@ -116,7 +116,7 @@ def branch_of_vertex(skeleton: Skeleton) -> np.ndarray:
 @np.errstate(all="ignore")
 def branch_of_point(skeleton: Skeleton, points: np.ndarray, vertex: np.ndarray) -> np.ndarray:
     """`segment` for points, (N, 3) float array, whose vertices are known, (N,) int array: (N,) int64 array."""
-    label = np.append(branch_of_vertex(skeleton), -1)[vertex]
+    label: np.ndarray = np.append(branch_of_vertex(skeleton), -1)[vertex]
     edge_branch = branch_of_edge(skeleton)
     unsure = np.flatnonzero((vertex >= 0) & (label < 0))
     unsure = unsure[np.argsort(vertex[unsure], kind="stable")]

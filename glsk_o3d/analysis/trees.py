@@ -9,7 +9,7 @@ from ..errors import InvalidParameterError
 from ..numerics.groups import Members
 from ..numerics.neighbourhoods import plane_axes
 from ..numerics.polylines import arc_lengths, place_at, relative_distance
-from ..numerics.vectors import TINY, norm
+from ..numerics.vectors import TINY, Floats, norm
 from ..numerics.vectors import unit as directions
 from .branches import branch_table
 from .rows import Rows
@@ -43,8 +43,8 @@ class Cylinders(Rows, row="cylinder"):
 
     start_point: np.ndarray
     end_point: np.ndarray
-    radius: np.ndarray
-    length: np.ndarray
+    radius: Floats
+    length: Floats
     parent: np.ndarray
     branch: np.ndarray
     order: np.ndarray

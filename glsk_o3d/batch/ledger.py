@@ -58,7 +58,7 @@ class Ledger:
             stream.write(_line(row))
 
 
-def _checked(row: Any, folder: Path) -> Row:
+def _checked(row: Row, folder: Path) -> Row:
     """A row, if a batch has written it: its outputs may be removed, so they must be in the folder."""
     known = row["status"] in (DONE, FAILED, STARTED) and isinstance(row["input"], str)
     if not (known and isinstance(row["outputs"], list)):

@@ -134,7 +134,8 @@ class DaskWorkers:
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
         """Hand out one piece of work; BatchError where the scheduler is gone."""
         try:
-            return self._executor.submit(function, *arguments)
+            future: Future[Any] = self._executor.submit(function, *arguments)
+            return future
         except Exception as error:  # whatever a lost connection raises
             raise BatchError(CONNECTION_LOST) from error
 

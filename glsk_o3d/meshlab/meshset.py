@@ -108,7 +108,8 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[misc, name-defined]
         super().clear_filter_script()
         here = os.getcwd()
         try:
-            return super().apply_filter(name, **params)
+            result: dict[str, Any] = super().apply_filter(name, **params)
+            return result
         finally:
             os.chdir(here)  # when Poisson's fails, it stays in a temporary folder that it has removed
 
@@ -209,7 +210,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[misc, name-defined]
             super().save_current_mesh(os.fspath(file_name), *args, **kwargs)
 
 
-def _known(name: Any) -> str:
+def _known(name: str) -> str:
     """The name of a filter; InvalidParameterError if there is none."""
     if name not in MeshSet.filter_list():
         raise InvalidParameterError(did_you_mean(str(name), MeshSet.filter_list(), "filter"))

@@ -37,7 +37,8 @@ class Slot:
     @property
     def kind(self) -> str:
         """The type without the mark that it may be None."""
-        return self.facts["type"].rstrip("?")
+        kind: str = self.facts["type"]
+        return kind.rstrip("?")
 
     @property
     def words(self) -> tuple[str, ...]:

@@ -147,7 +147,8 @@ def from_recipe(recipe: dict[str, Any]) -> Pipeline[Any]:
     if not isinstance(stages, list) or not stages:
         raise RecipeError(f"pipeline: must be a list of at least one stage, not {shown(stages)}")
     read: list[Any] = [_part(stage, f"pipeline[{i}]", "filter") for i, stage in enumerate(stages)]
-    return _valid(lambda: Pipeline(*read), "pipeline")
+    pipeline: Pipeline[Any] = _valid(lambda: Pipeline(*read), "pipeline")
+    return pipeline
 
 
 def _check_head(recipe: Any) -> None:
@@ -186,7 +187,8 @@ def _part(table: Any, path: str, role: str) -> Parameters:
     if origin not in (None, cls.__module__):
         raise RecipeError(f"{path}.{FROM}: {name!r} of {origin} is not among the filters and rules of 'glsk filters'")
     values = _values(cls, {key: value for key, value in table.items() if key not in (kind, FROM)}, path)
-    return _valid(lambda: cls(**values), path)
+    part: Parameters = _valid(lambda: cls(**values), path)
+    return part
 
 
 def _refuse_gap(value: Any, path: str) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from ..errors import InvalidParameterError
-from .capsules import Sample, check, directions, union_sample
+from .capsules import Floats, Sample, check, directions, union_sample
 
 TWO_CAMERAS = ((1.1, 1.8, 1.4), (-1.2, -1.7, 1.3))
 """Where the sauropod is scanned from: front left and rear right, a little above it."""
@@ -166,6 +166,6 @@ def _limbs(heading: np.ndarray, lean: float, rng: np.random.Generator) -> np.nda
     start = directions(TRIED, rng) * lean + heading / np.linalg.norm(heading)
     bend = directions(TRIED, rng) * BEND + [0, 0, UPWARDS * (lean > 0)]
     along = np.linspace(0, 1, PIECES)[:, None, None]
-    steps = start + along * bend
+    steps: Floats = start + along * bend
     steps /= np.linalg.norm(steps, axis=2, keepdims=True)
     return np.cumsum(steps, axis=0).swapaxes(0, 1) / PIECES
