@@ -8,7 +8,7 @@ import numpy as np
 from .errors import StageError
 from .numerics.neighbourhoods import plane_axes
 from .numerics.rings import Rings, star_rings
-from .numerics.vectors import dot, norm
+from .numerics.vectors import Floats, dot, norm
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .state import Contraction
@@ -121,9 +121,9 @@ def merge_energy(state: Contraction) -> np.ndarray:
     moved = norm(state.positions - state.previous)
     with np.errstate(divide="ignore", invalid="ignore"):
         pulled = np.nan_to_num(drop * s0 * moved / (eta * (s0 - s)), nan=0.0, posinf=np.inf, neginf=-np.inf)
-    contraction = (AMPLIFICATION_SQUARED * state.contraction_weight * eta) ** 2 * dot(delta, delta)  # Wen (7)
-    attraction = pulled**2  # Wen (8)
-    curvature = ((delta - state.rings.mean_over(delta)) ** 2).sum(axis=1)  # Wen (9)
+    contraction: Floats = (AMPLIFICATION_SQUARED * state.contraction_weight * eta) ** 2 * dot(delta, delta)  # Wen (7)
+    attraction: Floats = pulled**2  # Wen (8)
+    curvature: Floats = ((delta - state.rings.mean_over(delta)) ** 2).sum(axis=1)  # Wen (9)
     return contraction - attraction + CURVATURE_WEIGHT * curvature  # Wen (6)
 
 

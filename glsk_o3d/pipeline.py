@@ -137,7 +137,7 @@ class Pipeline(Generic[Produced]):
     RingBuilder(k=12, ...) | Contractor(...) | Connector(radius='3%', ...)
     """
 
-    def __init__(self, *stages: Filter) -> None:
+    def __init__(self, *stages: Filter[Any]) -> None:
         if not stages:
             raise InvalidParameterError("a pipeline needs at least one filter")
         for stage in stages:
@@ -157,7 +157,7 @@ class Pipeline(Generic[Produced]):
         *,
         on_iteration: OnIteration | None = None,
         on_state: OnState | None = None,
-        on_stage: Callable[[Filter], object] | None = None,
+        on_stage: Callable[[Filter[Any]], object] | None = None,
     ) -> Produced:
         """Run all filters on a cloud.
 
@@ -192,7 +192,8 @@ class Pipeline(Generic[Produced]):
                 report = with_stage(with_filters(data.report, report), stage, seconds)
                 data = dataclasses.replace(data, report=report)
         warn(message for message in report.warnings if message not in told)
-        return data
+        produced: Produced = data
+        return produced
 
     def check_complete(self) -> None:
         """Raise InvalidParameterError unless the pipeline leads from a cloud to a skeleton."""
@@ -228,7 +229,7 @@ class Pipeline(Generic[Produced]):
         >>> thin.stages[4].k, thin.stages[5].reducer, thin.stages[6].radius
         (12, None, '2%')
         """
-        pipeline: Any = self
+        pipeline: Pipeline[Produced] = self
         names: dict[tuple[type[Parameters], str], str] = {}
         given = [*(options or {}).items(), *named.items()]
         # a reducer or a rule is put in, or taken out, before its parameters change
@@ -275,7 +276,7 @@ class Pipeline(Generic[Produced]):
         return hash(self.stages)
 
 
-def parts(item: Pipeline | Parameters) -> Iterator[Parameters]:
+def parts(item: Pipeline[Any] | Parameters) -> Iterator[Parameters]:
     """Everything with parameters in a pipeline: its filters, and after each the reducer and the rule inside."""
     if isinstance(item, Pipeline):
         inner: Iterable[Any] = item.stages
@@ -306,7 +307,7 @@ def with_filters(report: Report, other: Report) -> Report:
     return dataclasses.replace(report, stages=other.stages, recipe=other.recipe, seconds=other.seconds)
 
 
-def with_stage(report: Report, stage: Filter, seconds: float) -> Report:
+def with_stage(report: Report, stage: Filter[Any], seconds: float) -> Report:
     """A report with one more filter in it."""
     name, table = type(stage).__name__, stage.table()
     if report.stop_reason == STOPPED_BY_CALLER:

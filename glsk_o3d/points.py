@@ -14,7 +14,7 @@ from .interop.clouds import cloud_counts, cloud_points, to_point_cloud
 from .numerics.frame import Frame, not_finite, to_working_frame
 from .numerics.grid_sampling import sample_cloud
 from .numerics.neighbourhoods import principal, row_medians
-from .numerics.vectors import TINY
+from .numerics.vectors import TINY, Ints
 from .report import Report
 
 Some = TypeVar("Some", bound="Representatives")
@@ -49,7 +49,7 @@ class Representatives:
     merged: np.ndarray
     noise: np.ndarray
     normals: np.ndarray
-    survivors: np.ndarray
+    survivors: Ints
     representative: np.ndarray
     report: Report
 

@@ -233,7 +233,7 @@ class Report:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Report:
         """Inverse of `to_dict`; unknown entries of later versions are ignored."""
-        report = _read(data, cls)
+        report: Report = _read(data, cls)
         if not all(decision.about in QUESTIONS for decision in report.decisions):
             raise ValueError("a decision in its report is about an unknown question")
         if len(report.root) not in (0, 3):

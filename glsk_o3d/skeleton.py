@@ -232,7 +232,7 @@ def as_color(color: Any, words: str) -> np.ndarray:
 
 def _complete(skeleton: Skeleton) -> None:
     """Make all fields arrays, and fill in those without rows; InvalidParameterError where that cannot be."""
-    arrays = {}
+    arrays: dict[str, np.ndarray] = {}
     for name, (columns, kind) in ARRAYS.items():
         given = getattr(skeleton, name)
         try:

@@ -33,7 +33,8 @@ def default_size(n: int) -> int:
     More points make the axis hardly more exact, since neither noise nor the thickness of parts shrinks with their
     spacing; they only cost time.
     """
-    return min(n, max(25000, round(64 * np.sqrt(n))))
+    size: int = max(25000, round(64 * np.sqrt(n)))
+    return min(n, size)
 
 
 @documented

@@ -1,5 +1,6 @@
 """How a skeleton lies in its cloud, without knowing the truth."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -14,6 +15,7 @@ from ..numerics.frame import check_extent
 from ..numerics.groups import component_labels, group_median, group_sum
 from ..numerics.neighbourhoods import nearest_neighbours, plane_axes
 from ..numerics.polylines import arc_lengths, place_at
+from ..numerics.vectors import Floats, Ints
 from ..skeleton import Skeleton
 
 CLUSTER_NEIGHBOURS = 16  # fitted: of each point, in the graph whose components are the clusters of a cloud
@@ -129,7 +131,7 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
     )
 
 
-def _neighbourhood(cloud):
+def _neighbourhood(cloud: np.ndarray) -> tuple[float, int]:
     """Median distance to the last of the neighbours, and the connected components of the neighbour graph."""
     k = min(CLUSTER_NEIGHBOURS, len(cloud))
     if k < 2:
@@ -139,7 +141,7 @@ def _neighbourhood(cloud):
     return float(np.median(distance[:, -1])), int(component_labels(len(cloud), pairs).max()) + 1
 
 
-def _at_junctions(skeleton, places, cloud):
+def _at_junctions(skeleton: Skeleton, places: np.ndarray, cloud: np.ndarray) -> Any:
     """Whether each place lies in the largest ball around a junction that holds no point of the cloud."""
     junctions = skeleton.vertices[skeleton.junctions]
     clearance = cKDTree(cloud).query(junctions)[0]
@@ -157,7 +159,7 @@ class Sections(NamedTuple):
     open_angles: np.ndarray  # radians in which the place sees no points: the sum of the gaps of more than a right angle
 
 
-def cross_sections(vertices, branches, points, shortest=0.0) -> Sections:
+def cross_sections(vertices: Floats, branches: Sequence[Ints], points: Floats, shortest: float = 0.0) -> Sections:
     """Cut a cloud into sections along a curve.
 
     Every point goes to the nearest place on the curve and is projected into the plane across the curve there; points
@@ -191,7 +193,7 @@ def cross_sections(vertices, branches, points, shortest=0.0) -> Sections:
     return Sections(places, lengths, count, offsets, radii, _open(q, section, n))
 
 
-def _cut(vertices, branches, n_points, shortest):
+def _cut(vertices: Floats, branches: Sequence[Ints], n_points: int, shortest: float) -> tuple[Floats, Floats, Floats]:
     """Places, unit tangents and lengths of the pieces that the branches are cut into."""
     along = [arc_lengths(vertices[path]) for path in branches]
     total = sum(travelled[-1] for travelled in along)
@@ -213,7 +215,7 @@ def _cut(vertices, branches, n_points, shortest):
     return np.concatenate(middles), tangent, np.concatenate(lengths)
 
 
-def _open(q, section, n):
+def _open(q: np.ndarray, section: np.ndarray, n: int) -> np.ndarray:
     """Sum of the gaps wider than a right angle between the directions to the points of each group."""
     angle = np.arctan2(q[:, 1], q[:, 0])
     order = np.lexsort((angle, section))

@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import InvalidParameterError
 from ..numerics.cycles import minimum_cycle_basis
 from ..numerics.polylines import arc_lengths, place_at
-from ..numerics.vectors import norm
+from ..numerics.vectors import Floats, Ints, norm
 from ..refinement.rooted import root_among
 from ..skeleton import Skeleton
 from .rows import Rows
@@ -81,7 +81,7 @@ class BranchTable(Rows, row="branch"):
     axis: np.ndarray
     order: np.ndarray
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"BranchTable({len(self)} branches, {self.level.max(initial=-1) + 1} levels)"
 
     def printed(self) -> dict[str, list[str]]:
@@ -90,14 +90,14 @@ class BranchTable(Rows, row="branch"):
         if not np.isfinite(self.support).any():
             del columns["support"]
 
-        def cell(value):
+        def cell(value: Any) -> str:
             if isinstance(value, float):
                 return "-" if np.isnan(value) else f"{value:.4g}"
             return str(value)
 
         return {name: list(map(cell, values)) for name, values in columns.items()}
 
-    def __str__(self):
+    def __str__(self) -> str:
         columns = [[name, *cells] for name, cells in self.printed().items()]
         widths = [max(map(len, column)) for column in columns]
         lines = ("  ".join(map(str.rjust, row, widths)) for row in zip(*columns, strict=True))
@@ -143,7 +143,7 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
     length = np.array([step.sum() for step in steps])
     weights = [np.r_[step, 0] + np.r_[0, step] if step.any() else np.ones(len(step) + 1) for step in steps]
 
-    def mean(values):
+    def mean(values: np.ndarray) -> np.ndarray:
         return np.array([_mean(values[path], weight) for path, weight in zip(paths, weights, strict=True)])
 
     section = mean((skeleton.radii / np.nanmax(skeleton.radii, initial=np.finfo(float).tiny)) ** 2)
@@ -179,7 +179,9 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
     )
 
 
-def _grow(skeleton, paths, length, volume, chosen):
+def _grow(
+    skeleton: Skeleton, paths: list[np.ndarray], length: np.ndarray, volume: np.ndarray, chosen: int | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Parent and level of every path, and whether it runs towards the root: three (B,) arrays.
 
     Paths are reached from the roots, the nearest first. `chosen` is the root vertex of its component, or None; other
@@ -224,7 +226,7 @@ def _grow(skeleton, paths, length, volume, chosen):
     return parent, level, backwards
 
 
-def _axes(parent, level, start, angle, radius, length):
+def _axes(parent: Ints, level: Ints, start: Ints, angle: Floats, radius: Floats, length: Floats) -> tuple[Ints, Ints]:
     """First row of every row's axis, and the axes before it: of those that begin in one place, one goes on.
 
     What lies beyond comes first: those stay behind that have no fair share of the greatest growth length, their own and
@@ -257,20 +259,20 @@ def _axes(parent, level, start, angle, radius, length):
     return axis, order
 
 
-def _mean(values, weights):
+def _mean(values: np.ndarray, weights: np.ndarray) -> Any:
     """Weighted mean of the values that are known, NaN without any."""
     known = np.isfinite(values) & (weights > 0)
     return np.average(values[known], weights=weights[known]) if known.any() else np.nan
 
 
-def _kinds(skeleton, paths):
+def _kinds(skeleton: Skeleton, paths: list[np.ndarray]) -> np.ndarray:
     """The kind of every path, see `BranchTable`."""
     cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
     on_loops = {
         frozenset(edge) for cycle in cycles for edge in zip(cycle.tolist(), np.roll(cycle, -1).tolist(), strict=True)
     }
 
-    def kind(path):
+    def kind(path: np.ndarray) -> str:
         if len(path) == 1:
             return "isolated"
         if frozenset(path[:2].tolist()) in on_loops:
@@ -280,7 +282,7 @@ def _kinds(skeleton, paths):
     return np.array([kind(path) for path in paths])
 
 
-def _angle(skeleton, paths, row, parent):
+def _angle(skeleton: Skeleton, paths: list[np.ndarray], row: int, parent: int) -> Any:
     """Degrees by which a path turns away from its parent, NaN where there is none or one of them is closed."""
     path, before = paths[row], paths[parent]
     if parent < 0 or path[0] == path[-1] or before[0] == before[-1]:
@@ -293,7 +295,7 @@ def _angle(skeleton, paths, row, parent):
     return np.degrees(np.arctan2(np.linalg.norm(np.cross(leaves, arrives)), leaves @ arrives))
 
 
-def _heading(curve, radius):
+def _heading(curve: np.ndarray, radius: float) -> np.ndarray:
     """Where a curve goes from its first point: from one to three radii, or over the first quarter."""
     along = arc_lengths(curve)
     reach = along[-1]

@@ -43,7 +43,7 @@ class Truth:
     edges: np.ndarray
     radii: np.ndarray
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         try:
             nodes = np.asarray(self.nodes, float).reshape(-1, 3)
             radii = np.asarray(self.radii, float).reshape(-1)
@@ -171,7 +171,7 @@ def compare(skeleton: Skeleton, truth: Any) -> Comparison:
     )
 
 
-def matching_f1(found, true, reach):
+def matching_f1(found: np.ndarray, true: np.ndarray, reach: np.ndarray) -> float:
     """F1 of found points as a guess at the true ones, (n, 3) and (m, 3); 1 if there are neither.
 
     A pair is no further apart than the `reach`, (m,), of its true point. The nearest pairs come first, each point once.
@@ -181,13 +181,13 @@ def matching_f1(found, true, reach):
     return 2 * len(matched(found, true, reach)) / (len(found) + len(true))
 
 
-def matched(found, true, reach):
+def matched(found: np.ndarray, true: np.ndarray, reach: np.ndarray) -> list[tuple[int, int]]:
     """The pairs of `matching_f1`: a list of (row of `found`, row of `true`)."""
     apart = cdist(found, true)
     return nearest_pairs(np.where(apart <= reach, apart, np.inf))
 
 
-def nearest_pairs(apart):
+def nearest_pairs(apart: np.ndarray) -> list[tuple[int, int]]:
     """Pairs (row, column) of finite distances, which become infinite: the nearest first, each row and column once."""
     pairs = []
     while np.isfinite(apart.min(initial=np.inf)):
@@ -197,7 +197,7 @@ def nearest_pairs(apart):
     return pairs
 
 
-def merged_junctions(points, axis, axis_radius):
+def merged_junctions(points: np.ndarray, axis: np.ndarray, axis_radius: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Clusters of junctions, (n, 3), that are within a local radius of the next one: their means and local radii.
 
     The local radius of a junction is that of the thickest part whose ball around a place of the axis holds it, else

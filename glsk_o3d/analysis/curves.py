@@ -1,15 +1,18 @@
 """Curves as arrays of edges, and places along these."""
 
+from typing import Any
+
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import InvalidParameterError
 from ..numerics.vectors import norm
+from ..skeleton import Skeleton
 
 MOST_ON_A_CURVE = 10**7  # derived: on a curve; the arrays of so many take a gigabyte
 
 
-def pieces(nodes, edges, step):
+def pieces(nodes: np.ndarray, edges: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
     """Edges cut into equal pieces no longer than `step`: the edge of each piece, and how far along it its middle is.
 
     Without edges every node stands for itself; `along` knows.
@@ -24,7 +27,7 @@ def pieces(nodes, edges, step):
     return row, (np.arange(len(row)) - before + 0.5) / count[row]
 
 
-def check_places(length, step):
+def check_places(length: np.ndarray | float, step: np.ndarray | float) -> None:
     """Raise InvalidParameterError where curves are so long that places on them, `step` apart, would fill the memory."""
     with np.errstate(all="ignore"):
         places = np.sum(length / step)
@@ -33,7 +36,7 @@ def check_places(length, step):
         raise InvalidParameterError(f"the skeleton is {far}: are all its coordinates and radii right?")
 
 
-def along(edges, row, part, values):
+def along(edges: np.ndarray, row: np.ndarray, part: np.ndarray, values: np.ndarray) -> Any:
     """Values at the nodes, interpolated to the middles of the pieces."""
     if len(edges) == 0:
         return values[row]
@@ -41,7 +44,7 @@ def along(edges, row, part, values):
     return start + (end - start) * part.reshape(-1, *[1] * (values.ndim - 1))
 
 
-def distances(curve, other, step):
+def distances(curve: Skeleton, other: Skeleton, step: float) -> tuple[np.ndarray, np.ndarray]:
     """From places along a curve to the nearest places along another, and the mean of the two radii there.
 
     Two (n,) float arrays; the places are `step` apart, and the radius is at least that.
@@ -51,7 +54,7 @@ def distances(curve, other, step):
     return distance, np.maximum((radius + radius_there[nearest]) / 2, step)
 
 
-def places_along(skeleton, step):
+def places_along(skeleton: Skeleton, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places along a skeleton, at most `step` apart: the edge of each, (n,), where it is, (n, 3), and its radius, (n,).
 
     Without edges these are the vertices.
@@ -61,7 +64,7 @@ def places_along(skeleton, step):
     return row, place, radius
 
 
-def check_graph(vertices, edges, name):
+def check_graph(vertices: np.ndarray, edges: Any, name: str) -> np.ndarray:
     """Edges as an (E, 2) int64 array; an InvalidParameterError says why `name`, as it calls the graph, is none."""
     edges = np.asarray(edges)
     edges = edges if edges.size else np.empty((0, 2), np.int64)
@@ -76,7 +79,7 @@ def check_graph(vertices, edges, name):
     return edges.astype(np.int64)
 
 
-def simple_edges(edges):
+def simple_edges(edges: np.ndarray) -> np.ndarray:
     """Edges, (E, 2) int array, as pairs i < j, sorted, each once, and none from a node to itself."""
     edges = np.unique(np.sort(edges, axis=1), axis=0)
     return edges[edges[:, 0] != edges[:, 1]]

@@ -129,7 +129,9 @@ def grasp_candidates(
     return candidates
 
 
-def _fitting(skeleton, gripper, clearance, spacing, min_confidence):
+def _fitting(
+    skeleton: Skeleton, gripper: Gripper, clearance: float, spacing: float | None, min_confidence: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, int], int]:
     """Places that fit between the jaws, as of `_places_on`, the branch, width and quality of each, how many do not fit,
     by reason, and how many were looked at."""
     found = [_places_on(skeleton, path, spacing) for path in skeleton.branches]
@@ -152,20 +154,20 @@ def _fitting(skeleton, gripper, clearance, spacing, min_confidence):
     return place[some], branch[some], width[some], quality[some], left_out, len(place)
 
 
-def _in_rounds(place, quality):
+def _in_rounds(place: np.ndarray, quality: np.ndarray) -> np.ndarray:
     """The order in which grasps are listed: the best of each place, then the second best of each, and so on; in each
     round the best first."""
     best = np.argsort(-quality, kind="stable")
     return best[np.argsort(group_rank(place[best], place.max(initial=-1) + 1), kind="stable")]
 
 
-def _sorted_out(reasons):
+def _sorted_out(reasons: dict[str, np.ndarray]) -> tuple[np.ndarray, dict[str, int]]:
     """The rows for which no reason holds, and how often each is the first that does."""
     first = np.select([reason.ravel() for reason in reasons.values()], list(reasons), "")
     return np.flatnonzero(first == ""), dict(Counter(first[first != ""].tolist()))
 
 
-def _places_on(skeleton, path, spacing):
+def _places_on(skeleton: Skeleton, path: np.ndarray, spacing: float | None) -> np.ndarray:
     """Places along a branch, (n, 9): position, axis, radius, its slope, confidence."""
     curve, radii = skeleton.vertices[path], skeleton.radii[path]
     along = arc_lengths(curve)
@@ -187,7 +189,7 @@ def _places_on(skeleton, path, spacing):
         at = (low + high) / 2 + step * (np.arange(count) - (count - 1) / 2)
     values = np.column_stack([curve, radii, skeleton.confidence[path]])
 
-    def sample(places):
+    def sample(places: np.ndarray) -> np.ndarray:
         period = {"period": length} if closed else {}
         return np.column_stack([np.interp(places, along, column, **period) for column in values.T])
 
@@ -197,14 +199,14 @@ def _places_on(skeleton, path, spacing):
         reach = np.minimum(reach, length / 4)
     before, behind = np.clip([at - reach, at + reach], *((-np.inf, np.inf) if closed else (0, length)))
     chord = sample(behind) - sample(before)
-    size = np.linalg.norm(chord[:, :3], axis=1, keepdims=True)
+    size: np.ndarray = np.linalg.norm(chord[:, :3], axis=1, keepdims=True)
     axis = np.divide(chord[:, :3], size, out=np.full((count, 3), np.nan), where=size > 0)
     apart = behind - before
     slope = np.divide(chord[:, 3], apart, out=np.zeros(count), where=apart > 0)
     return np.column_stack([here[:, :3], axis, here[:, 3], slope, here[:, 4]])[size[:, 0] > 0]
 
 
-def _directions_around(axis, n):
+def _directions_around(axis: np.ndarray, n: int) -> np.ndarray:
     """Directions perpendicular to each axis, (P, n, 3), evenly around it; the first points down as far as it can."""
     down, aside = (way - axis * (axis @ way)[:, None] for way in (np.array([0.0, 0, -1]), np.array([1.0, 0, 0])))
     size = np.linalg.norm(down, axis=1, keepdims=True)
@@ -214,7 +216,7 @@ def _directions_around(axis, n):
     return np.cos(turn) * first[:, None] + np.sin(turn) * np.cross(axis, first)[:, None]
 
 
-def _object(skeleton, cloud):
+def _object(skeleton: Skeleton, cloud: Any) -> np.ndarray:
     """The points of the object, none if the check is left out."""
     if isinstance(cloud, tuple | list) and len(cloud) == 0:
         return np.empty((0, 3))
@@ -226,7 +228,7 @@ def _object(skeleton, cloud):
     return points[np.isfinite(points).all(axis=1)]
 
 
-def _check(skeleton, clearance, around, spacing, min_confidence):
+def _check(skeleton: Skeleton, clearance: Any, around: Any, spacing: Any, min_confidence: Any) -> None:
     if len(skeleton.vertices) == 0:
         raise InvalidParameterError("the skeleton is empty: there is nothing to grasp")
     if not np.isfinite(skeleton.radii).any():

@@ -124,12 +124,12 @@ class GraspCandidates(Rows, row="grasp"):
     places: int = 0
     left_out: dict[str, int] = field(default_factory=dict)
 
-    def __getitem__(self, rows) -> GraspCandidates:
+    def __getitem__(self, rows: Any) -> GraspCandidates:
         rows = np.atleast_1d(np.arange(len(self))[rows])
         arrays = {name: value[rows] for name, value in vars(self).items() if isinstance(value, np.ndarray)}
         return replace(self, **arrays)
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         missed = f"; not taken: {listed(self.left_out)}" if self.left_out else ""
         return f"GraspCandidates({len(self)} at {self.places} places{missed})"
 
@@ -146,7 +146,7 @@ class GraspCandidates(Rows, row="grasp"):
             poses[:, :3, column] = vectors
         return poses
 
-    def to_line_set(self):
+    def to_line_set(self) -> Any:
         """Each gripper as a fork of four lines, an ``open3d.geometry.LineSet``.
 
         Two are the fingers, from tip to palm, with the opening between them, one joins them, one is as long as the palm
@@ -163,11 +163,11 @@ class GraspCandidates(Rows, row="grasp"):
         drawn.lines = o3d.utility.Vector2iVector(lines.reshape(-1, 2).astype(np.int32))
         return drawn
 
-    def to_json(self, path: str | os.PathLike) -> None:
+    def to_json(self, path: str | os.PathLike[str]) -> None:
         """Write candidates, poses, gripper and `left_out`; an unknown confidence is null."""
         write_json(path, self.as_dict())
 
-    def as_dict(self) -> dict:
+    def as_dict(self) -> dict[str, Any]:
         """What `to_json` writes: plain numbers, lists and dicts."""
         columns = {name: value.tolist() for name, value in vars(self).items() if isinstance(value, np.ndarray)}
         columns["confidence"] = [None if math.isnan(value) else value for value in columns["confidence"]]

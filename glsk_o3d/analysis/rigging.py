@@ -1,6 +1,7 @@
 """The armature of a skeleton for animation: where its joints are, and which bones move each point of a surface."""
 
 import itertools
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -65,7 +66,7 @@ def _without_junctions_in_balls(forest: Skeleton) -> tuple[Skeleton, int]:
         forest = merge_into(forest, group)
 
 
-def _joints_along(curve, radii, forks, kept):
+def _joints_along(curve: np.ndarray, radii: np.ndarray, forks: np.ndarray, kept: np.ndarray) -> np.ndarray:
     """How far along a branch its joints are, its ends and the vertices `kept` among them, (k,) float array."""
     lengths = arc_lengths(curve)
     low = _leaves_ball(curve, radii[0]) if forks[0] else 0.0
@@ -84,7 +85,7 @@ def _joints_along(curve, radii, forks, kept):
     return np.array(joints)
 
 
-def _leaves_ball(curve, radius):
+def _leaves_ball(curve: np.ndarray, radius: float) -> Any:
     """How far along a curve it leaves the ball around its first place; infinite if it never does."""
     away = curve - curve[0]
     outside = np.flatnonzero(norm(away) > radius)
@@ -124,7 +125,7 @@ def skin_weights(forest: Skeleton, points: np.ndarray, vertex: np.ndarray) -> tu
     return np.where(share > 0, bones, 0), share / share.sum(axis=1, keepdims=True)
 
 
-def _bones_around(forest):
+def _bones_around(forest: Skeleton) -> np.ndarray:
     """The bones that may move the same points as each bone, itself among them, (E, c) int array, filled up with -1."""
     n = len(forest.edges)
     ends = csr_array((np.ones(2 * n), (forest.edges.ravel(), np.repeat(np.arange(n), 2))))
@@ -140,7 +141,7 @@ def _bones_around(forest):
     return table
 
 
-def _squared_distance(forest, bone, points):
+def _squared_distance(forest: Skeleton, bone: np.ndarray, points: np.ndarray) -> Any:
     """From each point to a bone of its own, (N,) float array; what is beyond an end counts twice."""
     # else all bones of a joint would be equally near behind it, also those that point away
     _, along = nearest_on_edges(forest.vertices, forest.edges, bone[:, None], points)

@@ -27,8 +27,8 @@ class Rows:
     def __len__(self) -> int:
         return len(getattr(self, fields(self)[0].name))  # type: ignore[arg-type]
 
-    def _columns(self) -> dict[str, list]:
-        columns: dict[str, list] = {self._row: list(range(len(self)))}
+    def _columns(self) -> dict[str, list[Any]]:
+        columns: dict[str, list[Any]] = {self._row: list(range(len(self)))}
         for field in fields(self):  # type: ignore[arg-type]
             array = getattr(self, field.name)
             if not isinstance(array, np.ndarray):
@@ -45,7 +45,7 @@ class Rows:
         for row in zip(*columns.values(), strict=True):
             yield dict(zip(columns, row, strict=True))
 
-    def to_csv(self, path: str | os.PathLike) -> None:
+    def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write the table as CSV: a line of names, then a line per row. NaN and infinity are left empty.
 
         The file appears complete or not at all; an OSError says why it does not.

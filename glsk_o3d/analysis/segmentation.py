@@ -48,7 +48,7 @@ def segment(skeleton: Skeleton, cloud: Any = None) -> np.ndarray:
     return branch_of_point(skeleton, points, vertex)
 
 
-def vertex_of_cloud(skeleton, cloud=None):
+def vertex_of_cloud(skeleton: Skeleton, cloud: Any = None) -> tuple[np.ndarray, np.ndarray]:
     """The points of a cloud, by default that of the skeleton, and the vertex of each; -1 for those that are not finite.
 
     (N, 3) float64 and (N,) int64 array.
@@ -68,7 +68,7 @@ def vertex_of_cloud(skeleton, cloud=None):
     return points, vertex
 
 
-def label_of_nearest(points, label, others):
+def label_of_nearest(points: np.ndarray, label: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Labels of other points, (n,) int array: each has that of the nearest point that has one, not below 0.
 
     They are `label` itself if the points are the same; otherwise -1 only for points that are not finite.
@@ -81,7 +81,7 @@ def label_of_nearest(points, label, others):
     return found
 
 
-def _nearest_vertex(skeleton, points):
+def _nearest_vertex(skeleton: Skeleton, points: np.ndarray) -> Any:
     """The nearer end of the edge that is nearest to each point; vertices without edges count, too."""
     length = skeleton.edge_lengths.sum()
     alone = np.flatnonzero(skeleton.degree == 0)
@@ -93,7 +93,7 @@ def _nearest_vertex(skeleton, points):
     return np.concatenate([ends, alone])[cKDTree(places).query(points)[1]]
 
 
-def branch_of_edge(skeleton):
+def branch_of_edge(skeleton: Skeleton) -> np.ndarray:
     """The position in `Skeleton.branches` of every edge, (E,) int array."""
     m, none = len(skeleton.vertices), np.empty((0, 2), int)
     steps = [np.column_stack([path[:-1], path[1:]]) for path in skeleton.branches]
@@ -103,7 +103,7 @@ def branch_of_edge(skeleton):
     return branch
 
 
-def branch_of_vertex(skeleton):
+def branch_of_vertex(skeleton: Skeleton) -> np.ndarray:
     """The row of the branch table of every vertex, (M,) int array; -1 for junctions."""
     branch = np.full(len(skeleton.vertices), -1)
     branch[skeleton.edges] = branch_of_edge(skeleton)[:, None]
@@ -114,9 +114,9 @@ def branch_of_vertex(skeleton):
 
 
 @np.errstate(all="ignore")
-def branch_of_point(skeleton, points, vertex):
+def branch_of_point(skeleton: Skeleton, points: np.ndarray, vertex: np.ndarray) -> np.ndarray:
     """`segment` for points, (N, 3) float array, whose vertices are known, (N,) int array: (N,) int64 array."""
-    label = np.append(branch_of_vertex(skeleton), -1)[vertex]
+    label: np.ndarray = np.append(branch_of_vertex(skeleton), -1)[vertex]
     edge_branch = branch_of_edge(skeleton)
     unsure = np.flatnonzero((vertex >= 0) & (label < 0))
     unsure = unsure[np.argsort(vertex[unsure], kind="stable")]

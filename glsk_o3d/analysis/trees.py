@@ -9,7 +9,7 @@ from ..errors import InvalidParameterError
 from ..numerics.groups import Members
 from ..numerics.neighbourhoods import plane_axes
 from ..numerics.polylines import arc_lengths, place_at, relative_distance
-from ..numerics.vectors import TINY, norm
+from ..numerics.vectors import TINY, Floats, norm
 from ..numerics.vectors import unit as directions
 from .branches import branch_table
 from .rows import Rows
@@ -43,8 +43,8 @@ class Cylinders(Rows, row="cylinder"):
 
     start_point: np.ndarray
     end_point: np.ndarray
-    radius: np.ndarray
-    length: np.ndarray
+    radius: Floats
+    length: Floats
     parent: np.ndarray
     branch: np.ndarray
     order: np.ndarray
@@ -55,7 +55,7 @@ class Cylinders(Rows, row="cylinder"):
         """Of each cylinder, in the cube of the cloud's units."""
         return np.pi * self.radius**2 * self.length
 
-    def _columns(self) -> dict[str, list]:
+    def _columns(self) -> dict[str, list[Any]]:
         return super()._columns() | {"volume": self.volume.tolist()}
 
 
@@ -104,7 +104,7 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
         raise InvalidParameterError("the skeleton has no radii: a file of a format without them was read")
     table, beyond = branch_table(skeleton, _root(skeleton, root)), _beyond_tips(skeleton)
     last = np.full(len(table), -1)
-    rows: list[tuple] = []
+    rows: list[tuple[Any, ...]] = []
     for row in np.argsort(table.level[: len(skeleton.branches)], kind="stable").tolist():
         path = skeleton.branches[row]
         path = path if path[0] == table.start[row] else path[::-1]

@@ -80,7 +80,7 @@ class Grid:
         row, tile = np.concatenate(rows), np.concatenate(tiles)
         order = np.lexsort((row, *tile.T[::-1]))
         row, tile = row[order], tile[order]
-        starts = np.flatnonzero(np.r_[True, (np.diff(tile, axis=0) != 0).any(axis=1)]) if len(row) else []
+        starts: Any = np.flatnonzero(np.r_[True, (np.diff(tile, axis=0) != 0).any(axis=1)]) if len(row) else []
         for start, stop in zip(starts, [*starts[1:], len(row)], strict=True):
             yield tuple(tile[start].tolist()), row[start:stop]
 

@@ -15,7 +15,7 @@ RESERVED_STEMS = ("ledger", "recipe")
 
 
 def find_inputs(
-    inputs: Iterable[str | os.PathLike], out_dir: str | os.PathLike, *, recursive: bool = False
+    inputs: Iterable[str | os.PathLike[str]], out_dir: str | os.PathLike[str], *, recursive: bool = False
 ) -> tuple[dict[Path, str], dict[str, str]]:
     """The clouds that are meant by folders, lists and files: absolute paths with their names, sorted by these.
 

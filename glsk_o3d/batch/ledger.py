@@ -58,7 +58,7 @@ class Ledger:
             stream.write(_line(row))
 
 
-def _checked(row: Any, folder: Path) -> Row:
+def _checked(row: Row, folder: Path) -> Row:
     """A row, if a batch has written it: its outputs may be removed, so they must be in the folder."""
     known = row["status"] in (DONE, FAILED, STARTED) and isinstance(row["input"], str)
     if not (known and isinstance(row["outputs"], list)):
@@ -83,7 +83,7 @@ def _line(row: Row) -> bytes:
     return json.dumps(row).encode() + b"\n"
 
 
-def file_hash(path: str | os.PathLike) -> str:
+def file_hash(path: str | os.PathLike[str]) -> str:
     """SHA-256 of the bytes of a file, as ``sha256sum`` prints it; OSError for a pipe, which may never end."""
     if os.path.exists(path) and not os.path.isfile(path):
         raise OSError(f"{os.fspath(path)}: is no file")

@@ -78,10 +78,10 @@ class Plan:
 
 
 def plan_batch(
-    inputs: str | os.PathLike | Iterable[str | os.PathLike],
-    out_dir: str | os.PathLike,
+    inputs: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
+    out_dir: str | os.PathLike[str],
     *,
-    pipeline: Pipeline | Filter | str | os.PathLike = "default",
+    pipeline: Pipeline[Any] | Filter[Any] | str | os.PathLike[str] = "default",
     formats: Sequence[str] = ("ply",),
     preview: bool = False,
     cut_loops: bool = False,
@@ -192,7 +192,7 @@ def _endings(formats: Sequence[str], preview: bool) -> list[str]:
     return endings
 
 
-def _cut(pipeline: Pipeline, where: str | None, tiles: Any, overlap: Any) -> Cut | None:
+def _cut(pipeline: Pipeline[Any], where: str | None, tiles: Any, overlap: Any) -> Cut | None:
     """How scenes are to be taken apart, if they are."""
     if tiles is None:
         if overlap is not None:

@@ -61,11 +61,11 @@ class BatchResult:
 
 
 def run_batch(
-    inputs: str | os.PathLike | Iterable[str | os.PathLike],
-    out_dir: str | os.PathLike,
+    inputs: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
+    out_dir: str | os.PathLike[str],
     *,
     workers: int | None = None,
-    scheduler: str | os.PathLike | distributed.Client | None = None,
+    scheduler: str | os.PathLike[str] | distributed.Client | None = None,
     on_plan: Callable[[Plan], object] | None = None,
     on_result: Callable[[Row], object] | None = None,
     **options: Any,
@@ -174,7 +174,7 @@ class _Run:
 
     def _round(self, tasks: list[Task]) -> list[Task]:
         """Have tasks done, side by side; gives those whose workers died."""
-        ready, running, lost = deque(tasks), {}, []
+        ready, running, lost = deque(tasks), dict[Future[Any], Task](), []
         while running or ready:
             while len(running) < self._workers.capacity() and ready:
                 task = ready.popleft()
@@ -197,7 +197,7 @@ class _Run:
             del self._rows[row["name"]]
         self._add(task, {"status": STARTED, "outputs": list(task.outputs)})
 
-    def _collect(self, ended: dict[Future, Task]) -> list[Task]:
+    def _collect(self, ended: dict[Future[Any], Task]) -> list[Task]:
         """Put what came of tasks into the ledger; BatchError, in the end, where there is nobody to work any more."""
         gone, lost = None, []
         for future, task in ended.items():

@@ -96,7 +96,7 @@ def _of_tile(task: Task) -> Skeleton:
     cloud = read_cloud(task.path)
     none = np.empty((0, 3))
     try:
-        skeleton = from_recipe(task.recipe)(cloud)
+        skeleton: Skeleton = from_recipe(task.recipe)(cloud)
     except InvalidCloudError as error:
         report = Report(n_input=len(cloud.points)).with_warning(f"no skeleton in this tile: {error}")
         return Skeleton(none, np.empty((0, 2)), np.empty(0), np.empty(0), none, none, report)

@@ -38,7 +38,7 @@ class LocalWorkers:
         """How many pieces of work to hand out at a time."""
         return self._count
 
-    def submit(self, function: Callable, *arguments: Any) -> Future:
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
         """Hand out one piece of work; BatchError where processes die before they begin."""
         with _inherited():
             if self._pool is not None:
@@ -131,10 +131,11 @@ class DaskWorkers:
             self._asked = time.monotonic()
         return self._count
 
-    def submit(self, function: Callable, *arguments: Any) -> Future:
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
         """Hand out one piece of work; BatchError where the scheduler is gone."""
         try:
-            return self._executor.submit(function, *arguments)
+            future: Future[Any] = self._executor.submit(function, *arguments)
+            return future
         except Exception as error:  # whatever a lost connection raises
             raise BatchError(CONNECTION_LOST) from error
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,10 +19,7 @@ if TYPE_CHECKING:
 
 
 def batch(
-    inputs: Annotated[
-        list[str],
-        argument("DIR|LIST|SCAN...", "Folders, lists (.txt, a path per line), and scans."),
-    ],
+    inputs: Annotated[list[str], argument("DIR|LIST|SCAN...", "Folders, lists (.txt, a path per line), and scans.")],
     output: Annotated[Path, output_option("FOLDER", "For the skeletons and the ledger; made if needed.")],
     formats: Annotated[str, option("NAMES", f"With commas: {', '.join(SKELETON_ENDINGS)}.", "--format")] = "ply",
     preview: Annotated[bool, Option("--preview", help="Also draw each cloud with its skeleton (png).")] = False,
@@ -77,7 +75,7 @@ def batch(
 class _Watch:
     """Shows how far a batch is; says what fails as soon as it does."""
 
-    def __init__(self, update):
+    def __init__(self, update: Callable[..., None]) -> None:
         self._update, self._done = update, 0
 
     def begin(self, plan: Plan) -> None:

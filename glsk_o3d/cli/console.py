@@ -73,7 +73,7 @@ def progress(*, remaining: bool = False) -> Iterator[Callable[..., None]]:
     with bar.Progress(bar.SpinnerColumn(), *columns, console=out, transient=True) as bars:
         task = bars.add_task("starting", total=None)
 
-        def update(text, done=None, total=None):
+        def update(text: str, done: int | None = None, total: int | None = None) -> None:
             bars.update(task, description=visible(text), completed=done or 0, total=total)
 
         yield update
@@ -135,7 +135,7 @@ def print_json(data: Any) -> None:
     typer.echo(json.dumps(_finite(data), indent=2, allow_nan=False, default=str))
 
 
-def _finite(data):
+def _finite(data: Any) -> Any:
     if isinstance(data, Mapping):
         return {key: _finite(value) for key, value in data.items()}
     if isinstance(data, list | tuple):

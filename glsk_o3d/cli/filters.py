@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import re
+from collections.abc import Callable
 from itertools import chain
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,6 +16,7 @@ from .reporting import WrongUsage
 
 if TYPE_CHECKING:
     from ..parameters import Parameters
+    from ..pipeline import Pipeline
 
 
 def filters(
@@ -44,7 +46,8 @@ def filters(
 
 def _filter_facts(cls: type[Parameters]) -> dict[str, Any]:
     """What a filter or stopping rule says about itself; a rule consumes and produces None."""
-    from ..pipeline import Cloud, Filter
+    from ..interop.clouds import Cloud
+    from ..pipeline import Filter
 
     flow: dict[str, str | None] = {"consumes": None, "produces": None}
     if issubclass(cls, Filter):
@@ -56,7 +59,7 @@ def _filter_facts(cls: type[Parameters]) -> dict[str, Any]:
     return {"name": cls.__name__, "kind": kind, **_origin(cls), **flow, "parameters": parameters}
 
 
-def _pipeline_facts(name: str, make) -> dict[str, Any]:
+def _pipeline_facts(name: str, make: Callable[[], Pipeline[Any]]) -> dict[str, Any]:
     stages = make().stages
     return {"name": name, "kind": "pipeline", **_origin(make), "expression": " | ".join(map(repr, stages))}
 
@@ -65,7 +68,7 @@ def _default(field: dataclasses.Field[Any]) -> Any:
     return repr(field.default) if dataclasses.is_dataclass(field.default) else field.default
 
 
-def _origin(thing) -> dict[str, Any]:
+def _origin(thing: Any) -> dict[str, Any]:
     """The package that a filter or pipeline is from, None for this one, and what its docstring says first.
 
     That is all up to the first section, a line per paragraph, with the markup of formulas and code taken off.

@@ -17,10 +17,7 @@ if TYPE_CHECKING:
 FEW_VALUES = 12  # fitted: that an attribute may have for all of them to be listed
 
 
-def info(
-    file: Annotated[Path, argument("FILE", "A cloud, mesh or skeleton.")],
-    where: Where = None,
-) -> None:
+def info(file: Annotated[Path, argument("FILE", "A cloud, mesh or skeleton.")], where: Where = None) -> None:
     """Say what is in a cloud or skeleton file."""
     from ..analysis.summary import ITERATION_COLUMNS, iteration_rows
     from ..io.skeletons import holds_skeleton, read_skeleton

@@ -13,12 +13,12 @@ from ..recipes.catalogue import catalogue, serves
 _BOOLS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
 
 
-def choose(pipeline: str, settings: Iterable[str] | None = (), drop_invalid: bool = False) -> Pipeline:
+def choose(pipeline: str, settings: Iterable[str] | None = (), drop_invalid: bool = False) -> Pipeline[Any]:
     """The pipeline, from a cloud to a skeleton, that the options of a command ask for."""
     return override(as_pipeline(pipeline), [*(settings or ()), *["drop_invalid=true"] * drop_invalid])
 
 
-def override(pipeline: Pipeline, settings: Iterable[str]) -> Pipeline:
+def override(pipeline: Pipeline[Any], settings: Iterable[str]) -> Pipeline[Any]:
     """A pipeline with parameters replaced, each wherever its filter occurs, also inside another filter; in their order.
 
     A setting is ``Filter.parameter=value``, or ``parameter=value`` where only one part of the pipeline has a parameter
@@ -31,7 +31,7 @@ def override(pipeline: Pipeline, settings: Iterable[str]) -> Pipeline:
     return pipeline
 
 
-def _parse(setting: str, pipeline: Pipeline) -> tuple[str, Any]:
+def _parse(setting: str, pipeline: Pipeline[Any]) -> tuple[str, Any]:
     """A setting as `Pipeline.with_options` takes it: ``"Filter.parameter"`` and the value."""
     key, _, text = (word.strip() for word in setting.partition("="))
     owner, dot, name = (word.strip() for word in key.rpartition("."))

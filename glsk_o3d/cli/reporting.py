@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
+from typing import Any
 
 import typer
 
@@ -40,7 +41,7 @@ def as_command(function: Callable[..., None]) -> Callable[..., None]:
     """A function as a command: with --json, --quiet and --verbose, and with errors as lines."""
 
     @wraps(function)
-    def command(as_json=False, quiet=False, verbose=False, **options):
+    def command(as_json: bool = False, quiet: bool = False, verbose: bool = False, **options: Any) -> None:
         clouds = (options.get(name) for name in ("scan", "cloud", "mesh"))
         cloud = next((path for path in clouds if path is not None), None)
         flags.as_json = as_json

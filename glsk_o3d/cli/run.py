@@ -13,10 +13,7 @@ from .reporting import WrongUsage
 
 
 def run(
-    script: Annotated[
-        str | None,
-        argument("SCRIPT", "A filter script (.mlx), or the name of one in --list."),
-    ] = None,
+    script: Annotated[str | None, argument("SCRIPT", "A filter script (.mlx), or the name of one in --list.")] = None,
     scan: Annotated[Path | None, argument("SCAN", "The cloud or mesh it starts from.")] = None,
     output: Annotated[
         list[Path] | None,

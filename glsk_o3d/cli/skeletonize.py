@@ -14,6 +14,7 @@ from .options import option, output_option
 from .outputs import Output, check_outputs, skeleton_outputs, tell, write_each
 
 if TYPE_CHECKING:
+    from ..report import IterationRecord
     from ..skeleton import Skeleton
 
 
@@ -103,10 +104,10 @@ def demo(
     skeletonize(folder / "cloud.ply", outputs, preview=folder / "skeleton.png")
 
 
-def _run(pipeline: Callable[..., Skeleton], cloud: Any, update) -> tuple[Skeleton, float]:
+def _run(pipeline: Callable[..., Skeleton], cloud: Any, update: Callable[..., None]) -> tuple[Skeleton, float]:
     """Run a pipeline and show how far it is; gives the skeleton, and the seconds it took."""
 
-    def on_iteration(record):
+    def on_iteration(record: IterationRecord) -> None:
         update(f"solve {record.iteration}: {record.n_points - record.n_merged} points are left")
 
     start = time.perf_counter()

@@ -6,7 +6,9 @@ import numpy as np
 
 from ..analysis.curves import distances
 from ..numerics.cotangent import cotangent_laplacian
-from ..report import REFUSED
+from ..report import REFUSED, Report
+from ..skeleton import Skeleton
+from ..state import Contraction
 from .mesh import mesh_laplacian
 from .mesh_rings import umbrellas
 
@@ -52,7 +54,7 @@ class SkeletonAgreement:
     loops: tuple[int, int]
 
 
-def compare_rows(state, faces):
+def compare_rows(state: Contraction, faces: np.ndarray) -> tuple[np.ndarray, RowAgreement]:
     """Compare the Laplacian coordinates of a cloud, fresh from the ring builder, with those of a mesh of its points.
 
     Gives the angle at every distinct point, (m,) float array, 0 where both are flat and NaN where none is compared,
@@ -80,7 +82,7 @@ def compare_rows(state, faces):
     return angle, rows
 
 
-def compare_skeletons(ours, theirs, step):
+def compare_skeletons(ours: Skeleton, theirs: Skeleton, step: float) -> SkeletonAgreement:
     """How two skeletons agree, by places on both that are `step` apart."""
     both = [distances(*pair, step) for pair in ((ours, theirs), (theirs, ours))]
     in_radii = [distance / radius for distance, radius in both]
@@ -92,12 +94,14 @@ def compare_skeletons(ours, theirs, step):
     )
 
 
-def judge(rows, skeletons, warned, mesh_report):
+def judge(
+    rows: RowAgreement, skeletons: SkeletonAgreement, warned: tuple[str, ...], mesh_report: Report
+) -> tuple[str, tuple[str, ...]]:
     """The verdict on a cloud, as docs/crosscheck.md has it, and a tuple of what speaks against a better one.
 
     `warned` is what the cloud's own run warns of, `mesh_report` the report of the mesh's.
     """
-    faults, grave, slight = [], [], []  # of the mesh; against trust; against agreement
+    faults, grave, slight = [], [], list[str]()  # of the mesh; against trust; against agreement
     if REFUSED in mesh_report.stop_reason:
         faults.append(f"the mesh's own contraction failed: {mesh_report.stop_reason}")
     if rows.covered < COVERED_SHARE:

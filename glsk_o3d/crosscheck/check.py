@@ -15,6 +15,7 @@ from ..pipeline import Pipeline
 from ..report import warn
 from ..ring_builder import RingBuilder
 from ..skeleton import Skeleton
+from ..state import Contraction
 from ..thinner import Thinner
 from . import agreement
 from .mesh import ball_pivoting, mesh_skeleton
@@ -80,7 +81,7 @@ class CrossCheck:
         }
 
 
-def cross_check(cloud: Any, *, pipeline: Pipeline | str = "default") -> CrossCheck:
+def cross_check(cloud: Any, *, pipeline: Pipeline[Any] | str = "default") -> CrossCheck:
     """Check a cloud's Laplacian and skeleton against those of a mesh, computed with libigl (Au et al. 2008).
 
     A cloud of more than 16384 points is thinned to so many, evenly along its Morton curve, with a SkeletonWarning;
@@ -122,8 +123,8 @@ def cross_check(cloud: Any, *, pipeline: Pipeline | str = "default") -> CrossChe
     given = cloud_points(cloud)
     points = _thinned(given)
     rings = kinds.index(RingBuilder) + 1
-    state = Pipeline(*(stage for stage in pipeline.stages[:rings] if not isinstance(stage, Thinner)))(points)
-    skeleton = Pipeline(*pipeline.stages[rings:])(state)
+    state: Contraction = Pipeline(*(each for each in pipeline.stages[:rings] if not isinstance(each, Thinner)))(points)
+    skeleton: Skeleton = Pipeline(*pipeline.stages[rings:])(state)
     faces = ball_pivoting(state)
     angle, rows = agreement.compare_rows(state, faces)
     other = mesh_skeleton(state, faces, pipeline)
@@ -145,7 +146,7 @@ def cross_check(cloud: Any, *, pipeline: Pipeline | str = "default") -> CrossChe
     )
 
 
-def _thinned(points):
+def _thinned(points: np.ndarray) -> np.ndarray:
     """At most so many points, evenly along the Morton curve; and all that are not finite, for others to judge."""
     finite = np.isfinite(points).all(axis=1)
     good = np.flatnonzero(finite)

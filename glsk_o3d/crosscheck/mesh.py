@@ -4,6 +4,7 @@ import time
 import warnings
 from dataclasses import replace
 from itertools import dropwhile
+from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_array, diags_array
@@ -22,13 +23,14 @@ from ..numerics.vectors import dot
 from ..pipeline import Pipeline, with_stage
 from ..refiner import Refiner
 from ..report import Report
-from ..state import at_rest
+from ..skeleton import Skeleton
+from ..state import Contraction, at_rest
 from .mesh_rings import clean_faces, mesh_rings
 
 BALL_RADII = (1.0, 2.0, 4.0)  # fitted: of the rolling balls, in spacings
 
 
-def ball_pivoting(state):
+def ball_pivoting(state: Contraction) -> np.ndarray:
     """Roll balls over the cloud of a state (Bernardini et al. 1999).
 
     Gives faces over its points, (f, 3) int64 array, which may be no manifold; InvalidCloudError if there are hardly
@@ -48,7 +50,7 @@ def ball_pivoting(state):
     return faces
 
 
-def mesh_laplacian(vertices, faces, cap=WEIGHT_CAP):
+def mesh_laplacian(vertices: np.ndarray, faces: np.ndarray, cap: float = WEIGHT_CAP) -> Any:
     """Twice ``igl.cotmatrix``, capped as `cotangent_laplacian` is, (n, n) csr_matrix; bare vertices have empty rows."""
     igl = require("igl")
     faces = faces[igl.doublearea(vertices, faces) > 0]  # igl would divide by them
@@ -56,7 +58,7 @@ def mesh_laplacian(vertices, faces, cap=WEIGHT_CAP):
     return (diags_array(cap / np.maximum(np.abs(laplacian.diagonal()), cap)) @ laplacian).tocsr()
 
 
-def mesh_state(state, faces):
+def mesh_state(state: Contraction, faces: np.ndarray) -> tuple[Contraction, np.ndarray]:
     """A mesh of the points of a state as a contraction about to start, and the faces over its positions.
 
     Points without a triangle go to the nearest with one.
@@ -74,14 +76,14 @@ def mesh_state(state, faces):
     return begun, faces
 
 
-def mesh_skeleton(state, faces, pipeline):
+def mesh_skeleton(state: Contraction, faces: np.ndarray, pipeline: Pipeline[Any]) -> Skeleton:
     """Skeleton of a mesh of the points of a state: its contraction by libigl's Laplacian (Au et al. 2008), then the
     rest of a pipeline.
 
     The pipeline's Contractor lends the parameters; reductions are left out, and gaps of the mesh stay gaps. Warnings
     are in the report alone.
     """
-    stages = list(dropwhile(lambda stage: not isinstance(stage, Contractor), pipeline.stages))
+    stages: list[Any] = list(dropwhile(lambda stage: not isinstance(stage, Contractor), pipeline.stages))
     begun, faces = mesh_state(state, faces)
     contractor = replace(stages[0], reducer=None)
     rest = [stage for stage in stages[1:] if not isinstance(stage, LPRReducer)]

@@ -13,13 +13,13 @@ from typing import Any
 from ..errors import FileFormatError
 
 
-def write_json(path: str | os.PathLike, data: Any) -> None:
+def write_json(path: str | os.PathLike[str], data: Any) -> None:
     """Write what JSON can hold, indented, as `write_atomically` does."""
     text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
 
 
-def write_csv(path: str | os.PathLike, names: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
+def write_csv(path: str | os.PathLike[str], names: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
     """Write a table, a line of names and a line per row, as `write_atomically` does; None is left empty."""
 
     def write(temporary: Path) -> None:
@@ -29,7 +29,7 @@ def write_csv(path: str | os.PathLike, names: Sequence[str], rows: Iterable[Iter
     write_atomically(path, write)
 
 
-def write_atomically(path: str | os.PathLike, write: Callable[[Path], object]) -> None:
+def write_atomically(path: str | os.PathLike[str], write: Callable[[Path], object]) -> None:
     """Write a file so that it appears complete or not at all.
 
     `write` makes a temporary file in the same folder, with the same ending, given its path. If it raises, that file is
@@ -49,7 +49,7 @@ def write_atomically(path: str | os.PathLike, write: Callable[[Path], object]) -
         temporary.unlink(missing_ok=True)
 
 
-def check_place(path: str | os.PathLike) -> None:
+def check_place(path: str | os.PathLike[str]) -> None:
     """FileNotFoundError if the folder of a file does not exist, OSError if the path is a folder or a device."""
     given, real = Path(path), Path(os.path.realpath(path))
     if not real.parent.is_dir():
@@ -59,7 +59,7 @@ def check_place(path: str | os.PathLike) -> None:
 
 
 @contextmanager
-def writing(path: str | os.PathLike) -> Iterator[None]:
+def writing(path: str | os.PathLike[str]) -> Iterator[None]:
     """An OSError that says which file cannot be written, and why."""
     try:
         yield
@@ -69,7 +69,7 @@ def writing(path: str | os.PathLike) -> Iterator[None]:
         raise OSError(error.errno, f"cannot be written: {os.strerror(error.errno)}", os.fspath(path)) from error
 
 
-def check_ending(path: str | os.PathLike, what: str, *endings: str) -> None:
+def check_ending(path: str | os.PathLike[str], what: str, *endings: str) -> None:
     """FileFormatError unless a file's name has one of the endings of `what` it is, such as ``"picture is a PNG"``."""
     if not Path(path).name.lower().endswith(endings):
         raise FileFormatError(f"{os.fspath(path)}: the {what} and its name ends in {' or '.join(endings)}")

@@ -56,14 +56,14 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
     """
     points, vertex = vertex_of_cloud(skeleton, cloud)
     found = labels(skeleton, points, vertex, color)
-    cloud = points if cloud is None else cloud
+    given: Any = points if cloud is None else cloud
     o3d = import_open3d()
-    name, tensor = open3d_class(cloud)
+    name, tensor = open3d_class(given)
     if name in ("PointCloud", "TriangleMesh"):
         kind = getattr(o3d.t.geometry, name)
-        geometry = cloud.clone() if tensor else kind.from_legacy(cloud, o3d.core.float64)
+        geometry = given.clone() if tensor else kind.from_legacy(given, o3d.core.float64)
     else:
-        array = cloud.cpu().numpy() if name == "Tensor" else np.asarray(cloud)
+        array = given.cpu().numpy() if name == "Tensor" else np.asarray(given)
         array = np.array(array, np.float32 if array.dtype == np.float32 else np.float64, order="C")
         geometry = o3d.t.geometry.PointCloud(o3d.core.Tensor(array))
     held = geometry.vertex if name == "TriangleMesh" else geometry.point

@@ -25,7 +25,7 @@ MOST_EXPANDED = 200  # fitted: times the size of a file that its content may tak
 ALWAYS_TAKEN = 1 << 26  # derived: bytes that any machine has
 
 
-def existing_file(path: str | os.PathLike) -> Path:
+def existing_file(path: str | os.PathLike[str]) -> Path:
     """The path of a file; FileNotFoundError, or FileFormatError for a folder, a pipe or an empty file."""
     path = Path(path)
     if path.is_dir():
@@ -38,7 +38,7 @@ def existing_file(path: str | os.PathLike) -> Path:
     return path
 
 
-def check_ends(path: str | os.PathLike) -> None:
+def check_ends(path: str | os.PathLike[str]) -> None:
     """Raise FileFormatError for a pipe or a device: what it gives may never end."""
     if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path)):
         raise FileFormatError(f"{path}: is a pipe or a device, not a file: write its output to a file first")

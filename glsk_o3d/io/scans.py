@@ -57,7 +57,7 @@ _SCAN_READERS: dict[str, Reader] = {
 }
 
 
-def read_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
+def read_cloud(path: str | os.PathLike[str], *, where: str | None = None) -> Any:
     """Read a point cloud, or the vertices of a mesh.
 
     All coordinates keep their digits. A warning is logged for a mesh of few vertices, which describe the surface badly.
@@ -100,7 +100,7 @@ def read_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
     return read_scan(path, where).to_legacy()
 
 
-def read_tensor_cloud(path: str | os.PathLike, *, where: str | None = None) -> Any:
+def read_tensor_cloud(path: str | os.PathLike[str], *, where: str | None = None) -> Any:
     """Read a cloud with all attributes of its points.
 
     Parameters
@@ -125,7 +125,7 @@ def read_tensor_cloud(path: str | os.PathLike, *, where: str | None = None) -> A
     return read_scan(path, where).to_tensor()
 
 
-def read_scan(path: str | os.PathLike, where: str | None = None) -> Scan:
+def read_scan(path: str | os.PathLike[str], where: str | None = None) -> Scan:
     """Read all that `read_tensor_cloud` does, and the triangles between the points of a mesh if all are taken."""
     scan = next(read_blocks(path, rows=ALL_ROWS, where=where))
     if len(scan.triangles) and len(scan) < FEW_VERTICES:
@@ -137,7 +137,7 @@ def read_scan(path: str | os.PathLike, where: str | None = None) -> Scan:
     return scan
 
 
-def read_mesh(path: str | os.PathLike) -> Any:
+def read_mesh(path: str | os.PathLike[str]) -> Any:
     """Read an Open3D triangle mesh from PLY, OBJ or STL; errors as from `read_cloud`, and
     FileFormatError for a file without triangles.
     """
@@ -158,7 +158,7 @@ def read_mesh(path: str | os.PathLike) -> Any:
 
 
 def read_blocks(
-    path: str | os.PathLike, *, rows: int = BLOCK_ROWS, where: str | None = None, bare: bool = False
+    path: str | os.PathLike[str], *, rows: int = BLOCK_ROWS, where: str | None = None, bare: bool = False
 ) -> Iterator[Scan]:
     """Read a scan a few points at a time, in the order of the file, or positions alone if they are to be `bare`.
 
@@ -172,12 +172,12 @@ def read_blocks(
     return _chosen(path, _opened(path, rows, bare and where is None)[1], where)
 
 
-def promised_points(path: str | os.PathLike) -> int | None:
+def promised_points(path: str | os.PathLike[str]) -> int | None:
     """How many points a file holds by its header; None for one that is not read in blocks. Errors as `read_blocks`."""
     return _opened(_scan_file(path), BLOCK_ROWS, True)[0]
 
 
-def _scan_file(path: str | os.PathLike) -> Path:
+def _scan_file(path: str | os.PathLike[str]) -> Path:
     path = existing_file(path)
     if path.suffix.lower() not in SCAN_ENDINGS:
         raise unknown_ending(path, SCAN_ENDINGS)

@@ -44,7 +44,7 @@ _HOLDS_LINES = {".ply": ply.holds_lines, ".obj": lines.holds_lines}  # formats t
 
 def save_skeleton(
     skeleton: Skeleton,
-    path: str | os.PathLike,
+    path: str | os.PathLike[str],
     *,
     cut_loops: bool = False,
     root: RootPlace | None = None,
@@ -103,7 +103,7 @@ def save_skeleton(
     write_atomically(path, lambda temporary: temporary.write_bytes(data))
 
 
-def read_skeleton(path: str | os.PathLike) -> Skeleton:
+def read_skeleton(path: str | os.PathLike[str]) -> Skeleton:
     """Read a skeleton from a file that `save_skeleton` or another program wrote.
 
     Parameters
@@ -151,7 +151,7 @@ def _is_cloud(path: Path) -> FileFormatError:
     return FileFormatError(f"{path}: is a cloud, not a skeleton: make one with skeletonize")
 
 
-def holds_skeleton(path: str | os.PathLike) -> bool:
+def holds_skeleton(path: str | os.PathLike[str]) -> bool:
     """Whether a file is there and a skeleton: PLY with edges or OBJ with lines, but no faces, or by the ending."""
     path = Path(path)
     ending = path.suffix.lower()
@@ -170,7 +170,7 @@ def skeleton_ending(path: Path) -> str:
     return path.suffix.lower()
 
 
-def read_truth(path: str | os.PathLike) -> Truth:
+def read_truth(path: str | os.PathLike[str]) -> Truth:
     """Read a known axis.
 
     Parameters

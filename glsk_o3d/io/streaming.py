@@ -27,7 +27,7 @@ LARGE_CLOUD = 10_000_000  # measured: points that in memory take 2 GB, and in bl
 
 
 def read_sample(
-    path: str | os.PathLike, *, n: int | None = None, where: str | None = None, drop_invalid: bool = False
+    path: str | os.PathLike[str], *, n: int | None = None, where: str | None = None, drop_invalid: bool = False
 ) -> Any:
     """Read the sample of a large scan that its skeleton needs, in memory that does not grow with the file.
 
@@ -71,7 +71,7 @@ def read_sample(
 
 
 def _sampled(
-    path: str | os.PathLike, size: Callable[[int], int], where: str | None, drop_invalid: bool
+    path: str | os.PathLike[str], size: Callable[[int], int], where: str | None, drop_invalid: bool
 ) -> tuple[np.ndarray, np.ndarray, int]:
     """As many points as `size` says of so many, how many each stands for, and how many were dropped."""
     dropped = 0
@@ -107,7 +107,7 @@ def _cloud(points: np.ndarray, counts: np.ndarray) -> Any:
     return cloud
 
 
-def sample_for(pipeline: Pipeline[Any], path: str | os.PathLike, where: str | None = None) -> Any | None:
+def sample_for(pipeline: Pipeline[Any], path: str | os.PathLike[str], where: str | None = None) -> Any | None:
     """The sample of a file that a pipeline takes of its points, as from `read_sample`, where that is worth while.
 
     That is where the file has more than ten million points and the pipeline does not take all; else None, and all is to
@@ -126,7 +126,7 @@ def sample_for(pipeline: Pipeline[Any], path: str | os.PathLike, where: str | No
 
 
 def annotate_file(
-    skeleton: Skeleton, path: str | os.PathLike, output: str | os.PathLike, *, where: str | None = None
+    skeleton: Skeleton, path: str | os.PathLike[str], output: str | os.PathLike[str], *, where: str | None = None
 ) -> int:
     """Write a scan with labels to a file, block by block, in memory that does not grow with it.
 

@@ -52,7 +52,7 @@ class Layer:
         return cls(cloud_points(data), label=label, source=source)
 
     @classmethod
-    def read(cls, path: str | os.PathLike) -> Layer:
+    def read(cls, path: str | os.PathLike[str]) -> Layer:
         """A scan that `read_cloud` reads, with the faces of a mesh and the quality of points."""
         scan = read_scan(path)
         colors = scan.colors
@@ -140,7 +140,7 @@ class Layer:
             return self.skeleton
         return graph_skeleton(self.vertices, np.empty((0, 2)) if self.edges is None else self.edges, self.scalars)
 
-    def save(self, path: str | os.PathLike, **options: Any) -> None:
+    def save(self, path: str | os.PathLike[str], **options: Any) -> None:
         """Write the layer, complete or not at all: a skeleton by `save_skeleton`, which has the options.
 
         Others as ``.ply`` with everything, the scalars as ``quality`` as MeshLab has it, or their vertices as ``.xyz``.

@@ -22,7 +22,7 @@ from .verbs import Verb, verbs
 pymeshlab = require("pymeshlab")
 
 
-class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
+class MeshSet(pymeshlab.MeshSet):  # type: ignore[misc, name-defined]
     """``pymeshlab.MeshSet`` with the filters of this package added.
 
     Our filters are called like MeshLab's, by name or as methods, and can be mixed with them in filter scripts. Each
@@ -108,7 +108,8 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         super().clear_filter_script()
         here = os.getcwd()
         try:
-            return super().apply_filter(name, **params)
+            result: dict[str, Any] = super().apply_filter(name, **params)
+            return result
         finally:
             os.chdir(here)  # when Poisson's fails, it stays in a temporary folder that it has removed
 
@@ -133,7 +134,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         else:
             print(verb.help)
 
-    def load_filter_script(self, filter_script_name: str | os.PathLike) -> None:
+    def load_filter_script(self, filter_script_name: str | os.PathLike[str]) -> None:
         """Make a script file the current script. It is checked and not run; ScriptError names faults."""
         self._script = read_steps(filter_script_name)
 
@@ -142,7 +143,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         for each in self._script:
             self.apply_step(each)
 
-    def save_filter_script(self, filter_script_name: str | os.PathLike) -> None:
+    def save_filter_script(self, filter_script_name: str | os.PathLike[str]) -> None:
         """Write the current script: loaded filters, and those applied since. Our lengths in percent stay percentages.
 
         It does not record the current layer, so name the layer in our filters.
@@ -189,7 +190,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
             raise InvalidCloudError(f"the current layer ({layer.label}) has no edges: it is no skeleton")
         return layer.to_skeleton()
 
-    def load_scan(self, path: str | os.PathLike) -> None:
+    def load_scan(self, path: str | os.PathLike[str]) -> None:
         """Add a scan that `read_cloud` reads as a new layer, with the faces of a mesh and the quality of points.
 
         `load_new_mesh` reads MeshLab's formats, with textures and colours of faces.
@@ -197,7 +198,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
         layer = Layer.read(path)
         self.add_mesh(layer.to_pymeshlab(), layer.label)
 
-    def save_current_mesh(self, file_name: str | os.PathLike, *args: Any, **kwargs: Any) -> None:
+    def save_current_mesh(self, file_name: str | os.PathLike[str], *args: Any, **kwargs: Any) -> None:
         """Write the current layer as pymeshlab; without options a layer of vertices and edges by `save_skeleton`.
 
         So PLY files keep edges and radii, which MeshLab drops, and all formats of skeletons are available.
@@ -209,7 +210,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[name-defined]
             super().save_current_mesh(os.fspath(file_name), *args, **kwargs)
 
 
-def _known(name: Any) -> str:
+def _known(name: str) -> str:
     """The name of a filter; InvalidParameterError if there is none."""
     if name not in MeshSet.filter_list():
         raise InvalidParameterError(did_you_mean(str(name), MeshSet.filter_list(), "filter"))
@@ -219,7 +220,7 @@ def _known(name: Any) -> str:
 def _plain_lengths(params: dict[str, Any]) -> dict[str, Any]:
     """MeshLab's classes for lengths, which hold float32, as what our filters take."""
 
-    def plain(value):
+    def plain(value: Any) -> Any:
         if isinstance(value, pymeshlab.PercentageValue):
             return f"{np.float32(value.value())}%"
         return float(str(np.float32(value.value()))) if isinstance(value, pymeshlab.PureValue) else value
@@ -228,7 +229,7 @@ def _plain_lengths(params: dict[str, Any]) -> dict[str, Any]:
 
 
 def _method(verb: Verb) -> Callable[..., dict[str, Any]]:
-    def apply(self, **params):
+    def apply(self: MeshSet, **params: Any) -> dict[str, Any]:
         return self.apply_filter(verb.name, **params)
 
     apply.__name__, apply.__qualname__, apply.__doc__ = verb.name, f"MeshSet.{verb.name}", verb.help

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
+from typing import Any, NoReturn
 from xml.parsers import expat
 from xml.sax.saxutils import quoteattr
 
@@ -43,7 +44,7 @@ class Call:
     line: int = 0
 
 
-def read_script(path: str | os.PathLike) -> list[Call]:
+def read_script(path: str | os.PathLike[str]) -> list[Call]:
     """The filters of a script, at least one. Whether they exist is not asked here.
 
     FileNotFoundError, or FileFormatError for a folder, a device, or an empty or huge file. ScriptError, with the line,
@@ -58,10 +59,10 @@ def read_script(path: str | os.PathLike) -> list[Call]:
     def wrong(message: object, line: int | None = None) -> ScriptError:
         return ScriptError(f"{path}, line {line or parser.CurrentLineNumber}: {message}")
 
-    def entity(name, *_):
+    def entity(name: str, *_: Any) -> NoReturn:
         raise wrong(f"the DOCTYPE declares the entity {brief(name)!r}, which is refused")
 
-    def start(element, attributes):
+    def start(element: str, attributes: dict[str, str]) -> None:
         nonlocal depth
         if element not in _ELEMENTS[depth : depth + 1]:
             inside = f"inside <{_ELEMENTS[depth - 1]}>" if depth else "as the root of a filter script"
@@ -77,7 +78,7 @@ def read_script(path: str | os.PathLike) -> list[Call]:
                 raise wrong(f"filter {brief(calls[-1].name)!r}: a <Param> without a {'type' if name else 'name'}")
             calls[-1].params.append(Param(name, type, attributes, line))
 
-    def end(element):
+    def end(element: str) -> None:
         nonlocal depth
         depth -= 1
 
@@ -107,12 +108,12 @@ def script_text(calls: Iterable[Call]) -> str:
     return "\n".join([*lines, "</FilterScript>", ""])
 
 
-def write_script(path: str | os.PathLike, calls: Iterable[Call]) -> None:
+def write_script(path: str | os.PathLike[str], calls: Iterable[Call]) -> None:
     """Write filters as a script, complete or not at all."""
     write_atomically(path, lambda temporary: temporary.write_text(script_text(calls), encoding="utf-8"))
 
 
-def comment(path: str | os.PathLike) -> str:
+def comment(path: str | os.PathLike[str]) -> str:
     """The first comment of a script, in one line; empty if it has none."""
     comments: list[str] = []
     parser = expat.ParserCreate()

@@ -47,7 +47,7 @@ def step(verb: Verb, values: Mapping[str, Any]) -> Step:
     return Step(verb.name, dict(values), Call(verb.title, [verb.slots[name].written(v) for name, v in values.items()]))
 
 
-def read_steps(path: str | os.PathLike) -> list[Step]:
+def read_steps(path: str | os.PathLike[str]) -> list[Step]:
     """Read a filter script and check all of it.
 
     Errors are those of `read_script`; a ScriptError for a filter, parameter, type or value that is wrong names file,
@@ -56,7 +56,7 @@ def read_steps(path: str | os.PathLike) -> list[Step]:
     return [_step(call, path) for call in read_script(path)]
 
 
-def _step(call: Call, path: str | os.PathLike) -> Step:
+def _step(call: Call, path: str | os.PathLike[str]) -> Step:
     """A filter of a script with its values, all checked."""
     ours = {verb.title: verb for verb in verbs().values()}
     verb = ours.get(call.name)
@@ -84,7 +84,7 @@ def _step(call: Call, path: str | os.PathLike) -> Step:
     return Step(name, values, call, f"{path}, line {call.line}")
 
 
-def find_script(name: str | os.PathLike) -> Path:
+def find_script(name: str | os.PathLike[str]) -> Path:
     """The file of a script: a path that ends in .mlx or names a folder, or the name of one that comes with the package.
 
     InvalidParameterError if there is none of that name.

@@ -37,7 +37,8 @@ class Slot:
     @property
     def kind(self) -> str:
         """The type without the mark that it may be None."""
-        return self.facts["type"].rstrip("?")
+        kind: str = self.facts["type"]
+        return kind.rstrip("?")
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -136,7 +137,7 @@ class Verb:
         percent = {name: value for name, value in values.items() if self.slots[name].is_of_box(value)}
         return {**values, **{name: resolve_length(value, diagonal) for name, value in percent.items()}}
 
-    def plan(self, values: Mapping[str, Any]) -> Pipeline:
+    def plan(self, values: Mapping[str, Any]) -> Pipeline[Any]:
         """The pipeline with such parameters; refuses those of a filter that is not in it."""
         made = self.checked(values)
         names = {self.slots[name].option: name for name in made if self.slots[name].option}
@@ -162,7 +163,7 @@ class Verb:
 class SegmentVerb(Verb):
     """Points labelled by the branch of the skeleton that they belong to."""
 
-    def run(self, layer, given, on_iteration=None):
+    def run(self, layer: Layer, given: Mapping[str, Any], on_iteration: Callable[..., Any] | None = None) -> Layer:
         skeleton = layer.skeleton
         if skeleton is not None and len(skeleton.points):
             layer = layer.source or layer

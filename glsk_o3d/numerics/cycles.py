@@ -69,7 +69,7 @@ def _horton(chains: list[Chain]) -> list[Chain]:
 
     # Candidates: a chain, closed by the shortest paths from a root to its two ends.
     totals = distance[:, ends[:, 0]] + distance[:, ends[:, 1]] + lengths
-    basis, pivots = [], {}
+    basis, pivots = list[tuple[float, list[int]]](), dict[int, int]()
     for candidate in np.argsort(totals, axis=None, kind="stable").tolist():
         root, e = divmod(candidate, len(chains))
         total = float(totals[root, e])

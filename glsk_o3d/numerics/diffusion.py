@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.sparse import csr_array
 
-from .vectors import TINY, dot
+from .vectors import TINY, Floats, dot
 
 DIFFUSION_STEPS = 10  # measured: conjugate gradients, after which places along a curve stand still
 LEAST_BEND = 1e-12  # derived: of what a step may gain, that is more than roundings: points in one place have none
@@ -33,8 +33,8 @@ class Diffusion:
         # over less than a thousandth of its links a value stays what it is
         hold = self._stiffness / np.maximum(length**2, 1e-6 * np.maximum(self._stiffness, TINY))
         diagonal = np.maximum(hold + self._degree, TINY)[:, None]
-        mean = values.mean(axis=0)  # what is far from the origin would lose digits
-        found = values - mean
+        mean: Floats = values.mean(axis=0)  # what is far from the origin would lose digits
+        found: Floats = values - mean
         residual = self._links @ found - self._degree[:, None] * found
         ahead = step = residual / diagonal
         size = (residual * step).sum()  # of all columns: those of positions turn with them

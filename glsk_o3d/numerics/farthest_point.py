@@ -18,7 +18,7 @@ def farthest_point_sampling(points: np.ndarray, radius: np.ndarray) -> tuple[np.
     nearest = np.full(len(points), np.inf)
     representative = np.zeros(len(points), int)
     sample = int(np.argmax(((points - points.mean(axis=0)) ** 2).sum(axis=1)))
-    samples = []
+    samples: list[int] = []
     while nearest[sample] > 1:
         # Only points nearer to the new sample than the farthest point is to the old ones can change hands.
         reach = nearest[sample]

@@ -101,7 +101,7 @@ def cells_along(codes: np.ndarray, bits: int, n: int) -> float:
         return 1.0
     if counts[-1] < n:
         return FINEST_CELLS
-    wider = np.log(counts[-1] / n) / np.log(counts[-1] / counts[-2])
+    wider: float = np.log(counts[-1] / n) / np.log(counts[-1] / counts[-2])
     return 2 ** (len(counts) - 1 - wider)
 
 

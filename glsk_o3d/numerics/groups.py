@@ -6,8 +6,10 @@ import numpy as np
 from scipy.sparse import coo_matrix, csc_array
 from scipy.sparse.csgraph import connected_components
 
+from .vectors import Floats
 
-def group_median(values: np.ndarray, group: np.ndarray, n: int) -> np.ndarray:
+
+def group_median(values: np.ndarray, group: np.ndarray, n: int) -> Floats:
     """Median of the values (m,) of each group 0 .. n-1, (n,) float array; 0 for an empty group."""
     order = np.argsort(values)
     # NumPy sorts small integers by their digits: ten times faster than lexsort

@@ -5,7 +5,7 @@ import numpy as np
 from .vectors import TINY
 
 MORTON_BITS = 21  # derived: per axis: 63 bits in all
-FINEST_CELLS = 2**MORTON_BITS - 1  # derived: cells along the longest side of the finest grid
+FINEST_CELLS: int = 2**MORTON_BITS - 1  # derived: cells along the longest side of the finest grid
 
 
 def morton_order(points: np.ndarray) -> np.ndarray:

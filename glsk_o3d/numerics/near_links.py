@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from .groups import component_labels, group_sum
 from .neighbourhoods import nearest_neighbours, row_medians
-from .vectors import TINY, dot, norm, unit
+from .vectors import TINY, Ints, dot, norm, unit
 
 LINK_NEIGHBOURS = 20  # fitted: nearest points that a point may be linked with
 LINK_SPACINGS = 2.0  # fitted: longest link over the local spacing; twigs that pass each other are mostly farther apart
@@ -45,7 +45,7 @@ def link_growth(links: csr_matrix) -> np.ndarray:
     """
     step = steps(links)
     one, two = np.diff(step.indptr), np.diff((step @ step).indptr)
-    growth = two / one
+    growth: np.ndarray = two / one
     for _ in range(2):
         growth = (step @ growth) / one
     return growth
@@ -109,7 +109,7 @@ def _spanning(piece: np.ndarray, ends: np.ndarray, length: np.ndarray) -> np.nda
     low, high = np.sort(piece[ends], axis=1).T
     order = np.lexsort((length, high, low))
     pair = (low * m + high)[order]
-    first = order[np.append(True, pair[1:] != pair[:-1])]  # the shortest of each two pieces
+    first: Ints = order[np.append(True, pair[1:] != pair[:-1])]  # the shortest of each two pieces
     between = coo_matrix((np.maximum(length[first], TINY), (low[first], high[first])), shape=(m, m))
     tree = minimum_spanning_tree(csr_matrix(between)).tocoo()
     return first[np.isin(low[first] * m + high[first], tree.row.astype(int) * m + tree.col)]

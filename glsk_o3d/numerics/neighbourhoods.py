@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from .cores import threads
 from .eigen import principal_parts
-from .vectors import PAIRS, dot, unit
+from .vectors import PAIRS, Floats, dot, unit
 
 THREAD_POINTS = 4096  # speed: points whose neighbours are worth a thread
 SCATTER_CHUNK = 4096  # speed: rows at a time: the (3, rows, k) work array then stays in the cache
@@ -66,12 +66,12 @@ def nearest_moved(points: np.ndarray, neighbours: np.ndarray, moved: np.ndarray)
     """
     changed = moved[neighbours].any(axis=1)
     changed[neighbours[moved]] = True
-    found = neighbours.copy()
+    found: np.ndarray = neighbours.copy()
     found[changed] = nearest_neighbours(points, neighbours.shape[1], of=points[changed])[1]
     return found
 
 
-def local_outlier_ratio(mean: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
+def local_outlier_ratio(mean: Floats, neighbours: np.ndarray) -> np.ndarray:
     """Mean distance of every point to its neighbours over that of the neighbours to theirs (Breunig et al. 2000, LOF).
 
     Near 1 on a surface, whatever its density; an outlier has more.
@@ -79,10 +79,10 @@ def local_outlier_ratio(mean: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     return mean / row_medians(mean.take(neighbours[:, 1:]))
 
 
-def row_medians(values: np.ndarray) -> np.ndarray:
+def row_medians(values: np.ndarray) -> Floats:
     """Median of every row of (n, k): several times faster than NumPy's on short rows."""
     k = values.shape[1]
-    ordered = np.sort(values, axis=1)
+    ordered: Floats = np.sort(values, axis=1)
     return (ordered[:, (k - 1) // 2] + ordered[:, k // 2]) / 2
 
 

@@ -15,7 +15,7 @@ def maximal_paths(n: int, edges: np.ndarray) -> list[tuple[list[int], list[int]]
     degree, paths = [len(links) for links in around], []
     for start in sorted(range(n), key=lambda v: degree[v] == 2):
         while around[start]:
-            here, vertices, path = start, [start], []
+            here, vertices, path = start, [start], list[int]()
             while here != start or not path:
                 ahead, edge = next(iter(around[here].items()))
                 del around[here][ahead], around[ahead][here]

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .groups import group_rank
-from .vectors import TINY, dot, norm
+from .vectors import TINY, Floats, dot, norm
 
 POLYLINE_CHUNK = 2**20  # speed: pairs of a point and an edge at a time: memory stays flat
 
@@ -15,7 +15,7 @@ def arc_lengths(path: np.ndarray) -> np.ndarray:
     return np.concatenate([[0], np.cumsum(norm(np.diff(path, axis=0)))])
 
 
-def place_at(path: np.ndarray, lengths: np.ndarray, length: float | np.ndarray) -> np.ndarray:
+def place_at(path: np.ndarray, lengths: np.ndarray, length: float | np.ndarray) -> Floats:
     """The place so far along a path, (p, 3) float array with its `arc_lengths`; (3,), or (k, 3) for k lengths."""
     return np.stack([np.interp(length, lengths, x) for x in path.T], axis=-1)
 

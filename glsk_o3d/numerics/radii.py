@@ -3,7 +3,7 @@
 import numpy as np
 
 from .groups import group_median, group_sum
-from .vectors import COLUMNS, ROWS, dot
+from .vectors import COLUMNS, ROWS, Floats, dot
 
 TIMES = np.where(ROWS == COLUMNS, 1, 2)  # that an entry stands in a symmetric matrix
 
@@ -34,7 +34,7 @@ def plane_distance_radii(
 
 
 def robust_radii(
-    planes: np.ndarray, distance: np.ndarray, doubt: np.ndarray, normals: np.ndarray, vertex: np.ndarray
+    planes: Floats, distance: np.ndarray, doubt: np.ndarray, normals: np.ndarray, vertex: np.ndarray
 ) -> np.ndarray:
     r"""Radii between the distances to the tangent planes of a vertex's points and those to the points themselves, (M,).
 
@@ -53,5 +53,5 @@ def robust_radii(
     shares = group_sum(normals[:, ROWS] * normals[:, COLUMNS], vertex, m) / np.maximum(count, 1)[:, None]
     # (a - b)^2 = 2 (a^2 + b^2) - 1
     flat = np.sqrt(np.clip(2 * shares**2 @ TIMES - 1, 0, 1))
-    weight = np.where(count > 0, np.sqrt(doubt) * (1 - flat), 0)
+    weight: Floats = np.where(count > 0, np.sqrt(doubt) * (1 - flat), 0)
     return (1 - weight) * planes + weight * group_median(distance, vertex, m)

@@ -38,7 +38,7 @@ def point_areas(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     times the surface's, after `denoise` .9 and 1.3 times. On the rim of an open surface half of the disc is empty, and
     counts.
     """
-    last = min(AREA_NEIGHBOURS, neighbours.shape[1] - 1)
+    last: int = min(AREA_NEIGHBOURS, neighbours.shape[1] - 1)
     away = points[neighbours[:, last]] - points[neighbours[:, 0]]
     return np.pi / max(last, 1) * dot(away, away)
 

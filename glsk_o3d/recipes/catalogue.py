@@ -1,6 +1,7 @@
 """Filters, stopping rules and pipelines by name, built in and of plugins."""
 
 from collections.abc import Callable
+from typing import Any
 
 from ..errors import InvalidParameterError, did_you_mean
 from ..interop.packages import FILTER_GROUP, PIPELINE_GROUP
@@ -36,7 +37,7 @@ def serves(cls: type[Parameters], kind: str) -> bool:
     return kind == "filter" or cls.consumes is cls.produces is Contraction
 
 
-def known_pipelines() -> dict[str, Callable[[], Pipeline]]:
+def known_pipelines() -> dict[str, Callable[[], Pipeline[Any]]]:
     """All pipelines by name, those of plugins after the built-in ones.
 
     Returns
@@ -47,7 +48,7 @@ def known_pipelines() -> dict[str, Callable[[], Pipeline]]:
     return {**PIPELINES, **plugins(PIPELINE_GROUP)}
 
 
-def named_pipeline(name: str) -> Pipeline:
+def named_pipeline(name: str) -> Pipeline[Any]:
     """The pipeline of that name, built in or of a plugin; InvalidParameterError suggests one if there is none.
 
     Parameters

@@ -17,7 +17,7 @@ RECIPE_ENDING = ".json"
 """Of files that hold recipes."""
 
 
-def to_recipe(pipeline: Pipeline) -> dict[str, Any]:
+def to_recipe(pipeline: Pipeline[Any]) -> dict[str, Any]:
     """A pipeline as a recipe, with every parameter in it.
 
     Parameters
@@ -47,7 +47,7 @@ def to_recipe(pipeline: Pipeline) -> dict[str, Any]:
     return recipe
 
 
-def save_recipe(pipeline: Pipeline, path: str | os.PathLike) -> None:
+def save_recipe(pipeline: Pipeline[Any], path: str | os.PathLike[str]) -> None:
     """Write a pipeline as a recipe, with every parameter in it, as JSON.
 
     Parameters
@@ -74,12 +74,12 @@ def save_recipe(pipeline: Pipeline, path: str | os.PathLike) -> None:
     write_json(path, to_recipe(pipeline))
 
 
-def _check_ending(path: str | os.PathLike) -> None:
+def _check_ending(path: str | os.PathLike[str]) -> None:
     if Path(path).suffix.lower() != RECIPE_ENDING:
         raise RecipeError(f"{os.fspath(path)}: unknown ending; recipes are {RECIPE_ENDING} files")
 
 
-def load_recipe(path: str | os.PathLike) -> Pipeline:
+def load_recipe(path: str | os.PathLike[str]) -> Pipeline[Any]:
     """Read a pipeline from a recipe.
 
     Parameters
@@ -119,7 +119,7 @@ def load_recipe(path: str | os.PathLike) -> Pipeline:
         raise RecipeError(f"{os.fspath(path)}: {error}") from None
 
 
-def from_recipe(recipe: dict[str, Any]) -> Pipeline:
+def from_recipe(recipe: dict[str, Any]) -> Pipeline[Any]:
     """The pipeline that a recipe describes.
 
     Parameters
@@ -147,7 +147,8 @@ def from_recipe(recipe: dict[str, Any]) -> Pipeline:
     if not isinstance(stages, list) or not stages:
         raise RecipeError(f"pipeline: must be a list of at least one stage, not {shown(stages)}")
     read: list[Any] = [_part(stage, f"pipeline[{i}]", "filter") for i, stage in enumerate(stages)]
-    return _valid(lambda: Pipeline(*read), "pipeline")
+    pipeline: Pipeline[Any] = _valid(lambda: Pipeline(*read), "pipeline")
+    return pipeline
 
 
 def _check_head(recipe: Any) -> None:
@@ -186,7 +187,8 @@ def _part(table: Any, path: str, role: str) -> Parameters:
     if origin not in (None, cls.__module__):
         raise RecipeError(f"{path}.{FROM}: {name!r} of {origin} is not among the filters and rules of 'glsk filters'")
     values = _values(cls, {key: value for key, value in table.items() if key not in (kind, FROM)}, path)
-    return _valid(lambda: cls(**values), path)
+    part: Parameters = _valid(lambda: cls(**values), path)
+    return part
 
 
 def _refuse_gap(value: Any, path: str) -> None:

@@ -14,7 +14,7 @@ from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.polylines import incident_edges, nearest_on_edges
 from ..numerics.radii import plane_distance_radii, robust_radii
 from ..numerics.solver import factorised
-from ..numerics.vectors import COLUMNS, FULL, ROWS, TINY, dot, norm, unit
+from ..numerics.vectors import COLUMNS, FULL, ROWS, TINY, Floats, dot, norm, unit
 from ..skeleton import NOT_MEASURED, Skeleton
 from .evidence import SurfaceGraph
 from .sections import Sections, VertexPoints, half_axes, measure_sections, normal_moments
@@ -130,7 +130,7 @@ def _smoother(
         nearest = node[there][nearest_neighbours(p[node[there]], 1, of=p)[1][:, 0]]
     start = surface.points + (p[node[:1]] - surface.points[:1])
 
-    def smooth(place: np.ndarray, length: np.ndarray) -> np.ndarray:
+    def smooth(place: Floats, length: np.ndarray) -> np.ndarray:
         values = np.where(there[:, None], place[node], start)
         moved = np.zeros_like(place)
         moved[node[there]] = (diffusion(values, np.where(there, length[node], 0)) - values)[there]

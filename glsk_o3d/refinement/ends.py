@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from ..numerics.groups import Members
 from ..numerics.polylines import arc_lengths, place_at
-from ..numerics.vectors import TINY, dot, norm, unit
+from ..numerics.vectors import TINY, Floats, dot, norm, unit
 from ..skeleton import NOT_MEASURED, Skeleton
 from .axis_fit import axis_box
 from .sections import Sections, VertexPoints, measure_sections
@@ -135,7 +135,7 @@ def _within(along: np.ndarray, stop: float, length: float) -> np.ndarray:
 def _way(places: np.ndarray, along: np.ndarray, start: float, stop: float) -> np.ndarray:
     """Direction of a path from one length along it to another, (3,) float array, by least squares."""
     lengths = np.linspace(start, stop, WAY_SAMPLES)
-    way = (lengths - lengths.mean()) @ place_at(places, along, lengths)
+    way: Floats = (lengths - lengths.mean()) @ place_at(places, along, lengths)
     return way / max(np.linalg.norm(way), TINY)
 
 
@@ -164,8 +164,8 @@ class _End(NamedTuple):
 
     points: np.ndarray  # (n, 3)
     normals: np.ndarray  # (n, 3), of either sign
-    way: np.ndarray  # (3,), slope of the parabola at the origin
-    bend: np.ndarray  # (3,), and how fast it changes along it
+    way: Floats  # (3,), slope of the parabola at the origin
+    bend: Floats  # (3,), and how fast it changes along it
     length: np.ndarray  # (n,), along the curve to the place nearest to each point
     steps: np.ndarray  # (s,), of the parabola,
     along: np.ndarray  # (s,), and its length up to them
@@ -188,7 +188,7 @@ class _End(NamedTuple):
 
     def curve(self, length: np.ndarray) -> np.ndarray:
         """Places so far ahead, (k, 3) float array."""
-        step = np.interp(length, self.along, self.steps) + np.maximum(length - self.along[-1], 0)
+        step: Floats = np.interp(length, self.along, self.steps) + np.maximum(length - self.along[-1], 0)
         return step[:, None] * self.way + (step**2 / 2)[:, None] * self.bend
 
     def tip(self, taper: _Taper) -> float:
@@ -200,7 +200,7 @@ class _End(NamedTuple):
         missing of the cap, of an open pipe all of it, counts as if it were where the sides stop: twice as far as their
         mean.
         """
-        reach = np.quantile(self.length, END_REACH)
+        reach: float = np.quantile(self.length, END_REACH)
         start = max(reach - END_WINDOW * taper.at(reach - taper.radius), 0.0)
         late = self.length > start
         if late.sum() < END_POINTS:
@@ -220,7 +220,7 @@ class _End(NamedTuple):
         owed = ROUND_AREA * side.sum() * taper.radius / (2 * max(stop, TINY))
         seen = weight / max(owed, weight, TINY)
         inside = (ROUND_MEAN - 1 / 2) * min(variance / max(ROUND_VARIANCE * radius**2, TINY), 1)
-        tip = start + seen * mean + (1 - seen) * stop - (1 / 2 + seen * inside) * radius
+        tip: float = start + seen * mean + (1 - seen) * stop - (1 / 2 + seen * inside) * radius
         return min(max(tip, 0.0), reach)
 
 
@@ -233,10 +233,10 @@ def _turn_and_bend(
     miss = dot(across, points)
     left = miss - powers[:, 1] * (across @ bend)
     weight = (length <= np.quantile(length, END_REACH)) * radius**2 / (radius**2 + 4 * left**2 + TINY)
-    frame = np.linalg.svd(way[None])[2][1:]
+    frame: Floats = np.linalg.svd(way[None])[2][1:]
     ask = (powers[:, :, None] * (across @ frame.T)[:, None]).reshape(-1, 4)
     stiff = END_BENDING / 2 * (weight @ powers**2).repeat(2)
-    found = np.linalg.solve((weight[:, None] * ask).T @ ask + np.diag(stiff + TINY), (weight * miss) @ ask)
+    found: Floats = np.linalg.solve((weight[:, None] * ask).T @ ask + np.diag(stiff + TINY), (weight * miss) @ ask)
     return found.reshape(2, 2) @ frame
 
 

@@ -41,7 +41,7 @@ class Limbs:
         self.region = np.arange(len(degree))
         if joined:
             self.region = component_labels(len(degree), ends[self.short & self.inner])
-        self.paths, self.branch, self.at = [], [], defaultdict(list)
+        self.paths, self.branch, self.at = list[np.ndarray](), list[int](), defaultdict[int, list[int]](list)
         for number, branch in enumerate(self.branches):
             for path in (branch, branch[::-1]):
                 if degree[path[0]] > 2:

@@ -34,7 +34,7 @@ def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
     decisions: list[Decision] = []
     while True:
         cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
-        kept, narrow, cut, used = [], [], [], set()
+        kept, narrow, cut, used = list[Decision](), [], [], set[int]()
         for cycle, loop in zip(cycles, loop_facts(skeleton, cycles, evidence), strict=True):
             false = loop.probability < least
             where = tuple(loop.centre.tolist())

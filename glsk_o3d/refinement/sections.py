@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..numerics.groups import Members, group_median, group_sum
-from ..numerics.vectors import COLUMNS, FULL, ROWS, dot, norm, unit
+from ..numerics.vectors import COLUMNS, FULL, ROWS, Floats, Ints, dot, norm, unit
 from ..skeleton import Skeleton
 
 
@@ -18,7 +18,7 @@ class VertexPoints:
     skeleton: Skeleton
 
     @cached_property
-    def rows(self) -> np.ndarray:
+    def rows(self) -> Ints:
         """Which input points they are, (n,) int array."""
         return self.skeleton.supporting_points
 
@@ -43,7 +43,7 @@ class VertexPoints:
         return self.points - self.skeleton.vertices.take(self.vertex, axis=0)
 
     @cached_property
-    def count(self) -> np.ndarray:
+    def count(self) -> Ints:
         """Points of every vertex, (M,) int array."""
         return np.bincount(self.vertex, minlength=len(self.skeleton.vertices))
 
@@ -69,8 +69,8 @@ LEAST_SHARE = 1e-5  # precision: of the squared normals, above which they say so
 class Sections(NamedTuple):
     """The section of the part at every vertex, in the cloud's units."""
 
-    half_width: np.ndarray  # (M,) the larger half axis
-    half_thickness: np.ndarray  # (M,) the smaller one
+    half_width: Floats  # (M,) the larger half axis
+    half_thickness: Floats  # (M,) the smaller one
     across: np.ndarray  # (M, 3) unit vectors in the direction of the width, up to their sign
 
     @property

@@ -123,7 +123,7 @@ class _Paths:
 
     def __init__(self, mixed: _Mixed, roots: np.ndarray) -> None:
         n, size, scale = mixed.n, len(mixed.places), mixed.scale
-        self.mixed, self.roots, self.steps = mixed, roots, []
+        self.mixed, self.roots, self.steps = mixed, roots, list[tuple[int, int]]()
         self._distance, self._before, _ = dijkstra(mixed.links, indices=roots, return_predecessors=True, min_only=True)
         self.centre = mixed.places.copy()
         self.centre[:n] = slice_centres(mixed.places[:n], mixed.links[:n, :n], self._distance[:n], SLICE_WIDTH * scale)

@@ -1,10 +1,15 @@
 """What all samples share, and unions of tapered capsules, the convex hulls of two balls, of which most are."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from ..errors import InvalidParameterError
+
+Floats: TypeAlias = np.ndarray[Any, np.dtype[np.float64]]
+Chain: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]  # nodes, edges, radii
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -34,12 +39,12 @@ class Sample:
     radii: np.ndarray
     name: str
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         counts = f"{len(self.points)} points, {len(self.nodes)} nodes, {len(self.edges)} edges"
         return f"Sample({self.name!r}, {counts})"
 
 
-def check(n, noise, **positive) -> None:
+def check(n: Any, noise: float, **positive: float) -> None:
     """Raise InvalidParameterError for a wrong number of points, noise, or length or angle by its name."""
     if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
         raise InvalidParameterError(f"n = {n!r}: must be an int of at least 1")
@@ -50,7 +55,7 @@ def check(n, noise, **positive) -> None:
             raise InvalidParameterError(f"{name} = {value!r}: must be finite and above 0")
 
 
-def collect(draw, n: int) -> np.ndarray:
+def collect(draw: Callable[[int], np.ndarray], n: int) -> np.ndarray:
     """Exactly n rows from a function that draws at most as many as it is asked for."""
     found, total, batch = [], 0, max(n, 256)
     while total < n:
@@ -60,7 +65,7 @@ def collect(draw, n: int) -> np.ndarray:
     return np.concatenate(found)[:n]
 
 
-def noisy(points, noise: float, rng) -> np.ndarray:
+def noisy(points: Floats, noise: float, rng: np.random.Generator) -> np.ndarray:
     """The points with Gaussian noise, which is a share of the diagonal of their box."""
     if noise == 0:
         return points
@@ -68,13 +73,13 @@ def noisy(points, noise: float, rng) -> np.ndarray:
     return points + rng.normal(scale=noise * diagonal, size=points.shape)
 
 
-def directions(n: int, rng) -> np.ndarray:
+def directions(n: int, rng: np.random.Generator) -> np.ndarray:
     """Random unit vectors, (n, 3)."""
-    v = rng.normal(size=(n, 3))
+    v: Floats = rng.normal(size=(n, 3))
     return v / np.linalg.norm(v, axis=1, keepdims=True)
 
 
-def chain(nodes, radius: float, closed: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def chain(nodes: Any, radius: float, closed: bool = False) -> Chain:
     """Nodes, edges and radii of a tube through the nodes, and back to the first if it is closed."""
     nodes = np.asarray(nodes, float)
     start = np.arange(len(nodes) - (not closed))
@@ -120,7 +125,9 @@ def capsule_distance(points: np.ndarray, a: np.ndarray, b: np.ndarray, radius_a:
     return np.hypot(along - foot, across) - (radius_a - slope * foot)
 
 
-def union_sample(name, nodes, edges, radii, n, noise, seed, cameras=None) -> Sample:
+def union_sample(
+    name: str, nodes: Floats, edges: np.ndarray, radii: Floats, n: int, noise: float, seed: int, cameras: Any = None
+) -> Sample:
     """n points, uniform by area, on the outer surface of the union, as far as one of the cameras sees it."""
     check(n, noise)
     rng = np.random.default_rng(seed)
@@ -138,7 +145,7 @@ def union_sample(name, nodes, edges, radii, n, noise, seed, cameras=None) -> Sam
     lean = np.sqrt(1 - slope**2)  # the cone touches its end balls where the normal has `slope` along the axis
     areas = np.concatenate([4 * np.pi * radii**2, np.pi * lean**2 * (ra + rb) * length])
 
-    def draw(m):
+    def draw(m: int) -> np.ndarray:
         piece = rng.choice(len(areas), m, p=areas / areas.sum())
         points = np.empty((m, 3))
         on_ball = piece < len(nodes)
@@ -164,13 +171,13 @@ def union_sample(name, nodes, edges, radii, n, noise, seed, cameras=None) -> Sam
     return Sample(noisy(collect(draw, n), noise, rng), nodes, edges, radii, name)
 
 
-def visible(points, camera, nodes, edges, radii) -> np.ndarray:
+def visible(points: Floats, camera: Floats, nodes: Floats, edges: np.ndarray, radii: Floats) -> np.ndarray:
     """Which points on the surface the camera, which is outside, sees: its ray meets nothing before them.
 
     Each tapered capsule is two balls and a cone between them; a ray meets all three in closed form.
     """
     ray = points - camera
-    reach = np.linalg.norm(ray, axis=1)
+    reach: Floats = np.linalg.norm(ray, axis=1)
     ray /= reach[:, None]
     to_node = camera - nodes
     first = np.full(len(points), np.inf)

@@ -1,10 +1,12 @@
 """Samples with limbs, unions of tapered capsules: a Y, an animal as two cameras see it, and a tree drawn at random."""
 
+from typing import Any
+
 import numpy as np
 from scipy.spatial.distance import cdist
 
 from ..errors import InvalidParameterError
-from .capsules import Sample, check, directions, union_sample
+from .capsules import Floats, Sample, check, directions, union_sample
 
 TWO_CAMERAS = ((1.1, 1.8, 1.4), (-1.2, -1.7, 1.3))
 """Where the sauropod is scanned from: front left and rear right, a little above it."""
@@ -62,9 +64,9 @@ def sauropod(
     >>> sauropod(500)
     Sample('sauropod', 500 points, 54 nodes, 54 edges)
     """
-    nodes, edges, radii = [], [], []  # x forward, y to its left, z up; the feet stand on z = 0
+    nodes, edges, radii = list[Any](), list[Any](), []  # x forward, y to its left, z up; the feet stand on z = 0
 
-    def grow(places, sizes, start=None, end=None):
+    def grow(places: Any, sizes: Any, start: int | None = None, end: int | None = None) -> int | None:
         """A chain of new nodes from `start`, closed onto `end`; returns its last node."""
         for place, size in zip(places, sizes, strict=True):
             if start is not None:
@@ -97,7 +99,7 @@ def sauropod(
     return union_sample("sauropod", *axis, n, noise, seed, cameras)
 
 
-def _curve(through, pieces):
+def _curve(through: Any, pieces: int) -> Any:
     """A Catmull-Rom spline as `pieces` points, without its first."""
     p = np.asarray(through, float)
     p = np.concatenate([2 * p[:1] - p[1:2], p, 2 * p[-1:] - p[-2:-1]])
@@ -159,11 +161,11 @@ def tree(
     return union_sample("tree", nodes, np.array(edges, np.int64), radii, n, noise, seed, cameras)
 
 
-def _limbs(heading, lean, rng):
+def _limbs(heading: np.ndarray, lean: float, rng: np.random.Generator) -> np.ndarray:
     """Limbs of unit length, (TRIED, PIECES, 3), that leave the origin, lean aside, and bend up a little."""
     start = directions(TRIED, rng) * lean + heading / np.linalg.norm(heading)
     bend = directions(TRIED, rng) * BEND + [0, 0, UPWARDS * (lean > 0)]
     along = np.linspace(0, 1, PIECES)[:, None, None]
-    steps = start + along * bend
+    steps: Floats = start + along * bend
     steps /= np.linalg.norm(steps, axis=2, keepdims=True)
     return np.cumsum(steps, axis=0).swapaxes(0, 1) / PIECES

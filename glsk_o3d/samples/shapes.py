@@ -3,10 +3,12 @@
 `n`, `noise` and `seed` are everywhere as in `sample_object`.
 """
 
+from typing import Any
+
 import numpy as np
 
 from ..errors import InvalidParameterError
-from .capsules import Sample, chain, check, collect, directions, noisy, union_sample
+from .capsules import Chain, Floats, Sample, chain, check, collect, directions, noisy, union_sample
 
 
 def tube(
@@ -59,13 +61,13 @@ def helix(n: int = 4096, *, noise: float = 0.0, seed: int = 0) -> Sample:
     rng = np.random.default_rng(seed)
     wire, cap = speed * end * 2 * np.pi * radius, 2 * np.pi * radius**2
 
-    def frame(t):
+    def frame(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         centre = np.stack([coil * np.cos(t), coil * np.sin(t), climb * (t - end / 2)], axis=-1)
         inward = np.stack([-np.cos(t), -np.sin(t), np.zeros_like(t)], axis=-1)
         tangent = np.stack([-coil * np.sin(t), coil * np.cos(t), np.full_like(t, climb)], axis=-1) / speed
         return centre, inward, tangent
 
-    def draw(m):
+    def draw(m: int) -> Any:
         which = rng.choice(3, m, p=np.array([wire, cap, cap]) / (wire + 2 * cap))
         t, angle = rng.uniform(0, end, m), rng.uniform(0, 2 * np.pi, m)
         centre, inward, tangent = frame(t)
@@ -125,7 +127,7 @@ def two_rings(n: int = 4096, *, noise: float = 0.0, seed: int = 0) -> Sample:
     rng = np.random.default_rng(seed)
     points, (nodes, edges, radii) = _ring(n, 0.3, 0.06, rng)
 
-    def second(x):  # turned about x, and moved so that it goes through the middle of the first
+    def second(x: Floats) -> Floats:  # turned about x, and moved so that it goes through the middle of the first
         return np.stack([x[:, 0] + 0.3, -x[:, 2], x[:, 1]], axis=1)
 
     points = np.where(rng.random(n)[:, None] < 0.5, points, second(points))
@@ -133,10 +135,10 @@ def two_rings(n: int = 4096, *, noise: float = 0.0, seed: int = 0) -> Sample:
     return Sample(noisy(points, noise, rng), nodes, edges, np.concatenate([radii, radii]), "two_rings")
 
 
-def _ring(n, ring_radius, radius, rng):
+def _ring(n: int, ring_radius: float, radius: float, rng: np.random.Generator) -> tuple[np.ndarray, Chain]:
     """Points of a torus around z, and nodes, edges and radii of its axis, in 128 pieces."""
 
-    def draw(m):
+    def draw(m: int) -> Any:
         around, tube_angle = rng.uniform(0, 2 * np.pi, (2, m))
         out = ring_radius + radius * np.cos(tube_angle)
         points = np.stack([out * np.cos(around), out * np.sin(around), radius * np.sin(tube_angle)], axis=1)

@@ -37,7 +37,7 @@ def new_figure(size: Any) -> Any:
     return figure
 
 
-def save_figure(figure, path: str | os.PathLike) -> None:
+def save_figure(figure: Any, path: str | os.PathLike[str]) -> None:
     """Write a figure as PNG, without the version of matplotlib; it appears complete or not at all."""
     options = {"format": "png", "dpi": DPI, "metadata": {"Software": None}}
     write_atomically(path, lambda temporary: figure.savefig(temporary, **options))

@@ -23,12 +23,7 @@ from .figures import MOST_DRAWN_POINTS, thinned
 FLAT_SIDE = 0.85  # a box whose least side is less than this share of the next is flat
 
 
-def save_report(
-    skeleton: Skeleton,
-    path: str | os.PathLike,
-    *,
-    title: str = "Curve skeleton",
-) -> None:
+def save_report(skeleton: Skeleton, path: str | os.PathLike[str], *, title: str = "Curve skeleton") -> None:
     """Write a page that shows a skeleton and the run that made it.
 
     The page is one HTML file that works offline in any browser with WebGL 2: cloud, skeleton and radius tubes to turn
@@ -59,7 +54,7 @@ def save_report(
     write_atomically(path, lambda temporary: temporary.write_bytes(page))
 
 
-def _page(skeleton, title) -> str:
+def _page(skeleton: Skeleton, title: str) -> str:
     shown = thinned(skeleton.points, MOST_DRAWN_POINTS)
     finite = np.isfinite(skeleton.points).all(axis=1).sum()
     assets = files(__package__) / "assets"
@@ -68,12 +63,7 @@ def _page(skeleton, title) -> str:
     report, kind = skeleton.report, "Curve skeleton" if len(skeleton.vertices) else "Point cloud"
     now = datetime.now(timezone.utc).strftime("%d %B %Y, %H:%M UTC")
     thinning = f"The view shows {len(shown):,} of {finite:,} points, drawn at random."
-    below = (
-        sections.contraction(report),
-        sections.topology(report),
-        sections.support(report),
-        sections.origin(report),
-    )
+    below = (sections.contraction(report), sections.topology(report), sections.support(report), sections.origin(report))
     parts = {
         "title": escape(title),
         "subtitle": escape(f"{kind} · glsk-o3d {report.versions.get('glsk-o3d', '')} · {now}"),
@@ -90,7 +80,7 @@ def _page(skeleton, title) -> str:
     return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], html)
 
 
-def _data(skeleton, shown) -> dict[str, Any]:
+def _data(skeleton: Skeleton, shown: np.ndarray) -> dict[str, Any]:
     viridis, to_hex = require("matplotlib").colormaps["viridis"], require("matplotlib.colors").to_hex
     points = skeleton.points[shown]
     box = np.concatenate([points, skeleton.vertices])
@@ -127,6 +117,6 @@ def _data(skeleton, shown) -> dict[str, Any]:
     }
 
 
-def _packed(array, dtype) -> str:
+def _packed(array: np.ndarray, dtype: str) -> str:
     with np.errstate(over="ignore"):  # radii may be infinitely larger than the cloud
         return base64.b64encode(np.ascontiguousarray(array, dtype).tobytes()).decode()

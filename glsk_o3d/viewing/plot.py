@@ -113,7 +113,7 @@ def plot_skeleton(
     return axes
 
 
-def _squares(axes):
+def _squares(axes: Any) -> Any:
     """Width and height that are free for the drawing, over the side of the square that matplotlib gives it."""
     size, spec = axes.figure.get_size_inches(), axes.get_subplotspec()
     if spec is None:

@@ -3,12 +3,14 @@
 import os
 import textwrap
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from ..analysis.summary import point_count, structure
 from ..interop.atomic import check_ending
 from ..numerics.vectors import norm
+from ..report import Report
 from ..skeleton import Skeleton
 from . import figures
 from .figures import INK, PAPER
@@ -27,7 +29,7 @@ _DOT_SHARE, _WIDEST_DOT, _LONE_DOT = 0.12, 3.0, 3.7
 _MOST_MARKS = 12  # of what samples disagree with
 
 
-def save_preview(skeleton: Skeleton, path: str | os.PathLike, *, title: str | None = None) -> None:
+def save_preview(skeleton: Skeleton, path: str | os.PathLike[str], *, title: str | None = None) -> None:
     """Draw a skeleton and its cloud from three sides into a PNG file.
 
     The three views look along the coordinate axes, all at the scale of the bar above them: x across and z up, y across
@@ -62,7 +64,7 @@ def save_preview(skeleton: Skeleton, path: str | os.PathLike, *, title: str | No
     figures.save_figure(draw(skeleton, title), path)
 
 
-def draw(skeleton: Skeleton, title: str | None = None):
+def draw(skeleton: Skeleton, title: str | None = None) -> Any:
     """The figure, not yet in a file."""
     cloud = skeleton.points[figures.thinned(skeleton.points, figures.MOST_DRAWN_POINTS)]
     centre, extent = figures.room(np.concatenate([cloud, skeleton.vertices]))
@@ -96,7 +98,7 @@ def counts(skeleton: Skeleton) -> dict[str, str]:
     return {name: f"{value:.4g}" if name == "length" else f"{value:,}" for name, value in facts.items()}
 
 
-def _draw_cloud(axes, cloud, a, b, area):
+def _draw_cloud(axes: Any, cloud: np.ndarray, a: int, b: int, area: float) -> None:
     """Grey dots, lighter where they are farther; smaller the more are in the area [points^2]."""
     depth, toward = cloud[:, 3 - a - b], 1 if (a, b) != (0, 2) else -1  # x, y, z are right-handed
     order = np.argsort(toward * depth, kind="stable")
@@ -105,7 +107,7 @@ def _draw_cloud(axes, cloud, a, b, area):
     axes.scatter(cloud[order, a], cloud[order, b], c=_FAR_DOT + near * (_NEAR_DOT - _FAR_DOT), **style)
 
 
-def _draw_curve(axes, skeleton, vertices, across_up, scale):
+def _draw_curve(axes: Any, skeleton: Skeleton, vertices: np.ndarray, across_up: list[int], scale: float) -> None:
     """Edges, and junctions and leaves where branches are long enough for dots on them; the scale is points per unit."""
     from matplotlib.collections import LineCollection
 
@@ -123,7 +125,7 @@ def _draw_curve(axes, skeleton, vertices, across_up, scale):
         axes.scatter(*vertices[chosen][:, across_up].T, zorder=3, clip_on=False, linewidths=0.3 * wide, **style)
 
 
-def _mark_doubts(axes, report, centre, across_up):
+def _mark_doubts(axes: Any, report: Report, centre: np.ndarray, across_up: list[int]) -> None:
     """Amber rings around what few samples show, crosses where many show what is not there, and how many of them."""
     for it in report.unsupported[:_MOST_MARKS]:
         x, y = np.subtract(it.place, centre)[across_up]

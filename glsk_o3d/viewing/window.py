@@ -3,6 +3,7 @@
 import ctypes
 import os
 import sys
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -63,8 +64,8 @@ def layers(skeleton: Skeleton, cloud: Any = None) -> dict[str, list[Any]]:
     return shapes
 
 
-def _switch(shapes, shown):
-    def switch(window):
+def _switch(shapes: list[Any], shown: bool) -> Callable[[Any], bool]:
+    def switch(window: Any) -> bool:
         nonlocal shown
         shown = not shown
         for shape in shapes:

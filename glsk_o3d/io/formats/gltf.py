@@ -34,7 +34,7 @@ UPRIGHT = {"z": [-(0.5**0.5), 0.0, 0.0, 0.5**0.5], "y": [0.0, 0.0, 0.0, 1.0]}  #
 
 def save_rig(
     skeleton: Skeleton,
-    path: str | os.PathLike,
+    path: str | os.PathLike[str],
     mesh: Any = None,
     *,
     cut_loops: bool = False,

@@ -68,7 +68,8 @@ def write_vtp(skeleton: Skeleton) -> bytes:
     _vtk_array(xml.SubElement(piece, "Points"), "Points", skeleton.vertices)
     _vtk_cells(piece, "Verts", alone[:, None])
     _vtk_cells(piece, "Lines", paths)
-    return xml.tostring(root, encoding="utf-8", xml_declaration=True)
+    written: bytes = xml.tostring(root, encoding="utf-8", xml_declaration=True)
+    return written
 
 
 def _vtk_cells(piece: xml.Element, name: str, paths: Iterable[np.ndarray]) -> None:

@@ -88,7 +88,8 @@ def write_urdf(skeleton: Skeleton) -> bytes:
         SubElement(joint, "parent", link="base" if root[i] else f"link_{parent[i]}")
         SubElement(joint, "child", link=f"link_{i}")
     indent(robot)
-    return tostring(robot, encoding="utf-8", xml_declaration=True) + b"\n"
+    written: bytes = tostring(robot, encoding="utf-8", xml_declaration=True)
+    return written + b"\n"
 
 
 def _solids(length: np.ndarray, radius: np.ndarray, ball: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
