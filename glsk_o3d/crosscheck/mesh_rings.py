@@ -27,14 +27,10 @@ def umbrellas(n: int, faces: np.ndarray) -> np.ndarray:
 
     The faces, (f, 3) int array, are as from `clean_faces`.
     """
-    corner = np.concatenate(
-        [faces, faces[:, [1, 2, 0]], faces[:, [2, 0, 1]]]
-    )  # every triangle from each of its corners
+    corner = np.concatenate([faces, faces[:, [1, 2, 0]], faces[:, [2, 0, 1]]])  # triangles from each corner
     ends = np.concatenate([corner[:, [0, 1]], corner[:, [0, 2]]])
     spoke, row, count = np.unique(ends @ [n, 1], return_inverse=True, return_counts=True)
-    fan = component_labels(
-        len(spoke), row.reshape(2, -1).T
-    )  # spokes are in one if triangles lead from one to the other
+    fan = component_labels(len(spoke), row.reshape(2, -1).T)  # spokes between which triangles lead
     odd = np.bincount(spoke // n, count != 2, n) > 0
     vertex_of_fan = np.unique(np.column_stack([spoke // n, fan]), axis=0)[:, 0]
     return ~odd & (np.bincount(vertex_of_fan, minlength=n) == 1)
