@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import sys
 import warnings as _warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
@@ -81,14 +81,6 @@ def _read(value: Any, hint: Any, name: str = "it") -> Any:
     elif kind is Any or isinstance(value, kind):
         return value
     raise ValueError(f"{name} in its report is {repr(value)[:80]}")
-
-
-def html_table(rows: Iterable[Sequence[str]], heads: Sequence[str] = (), align: str = "left") -> str:
-    """Texts as a table for a notebook, escaped; its style is in it, since not every notebook has Jupyter's sheet."""
-    cell = f'<{{0}} style="text-align:{align};padding:2px 10px">{{1}}</{{0}}>'
-    lines = [*[("th", heads)] * bool(heads), *(("td", row) for row in rows)]
-    body = "".join(f"<tr>{''.join(cell.format(tag, escape(text)) for text in texts)}</tr>" for tag, texts in lines)
-    return f'<table style="font:13px/1.5 system-ui,sans-serif;border-collapse:collapse">{body}</table>'
 
 
 def warn(messages: Iterable[str]) -> None:
@@ -190,7 +182,10 @@ class Report:
         return "\n".join(["Report", *(f"{name:11} {words}".rstrip() for name, words in self._told())])
 
     def _repr_html_(self) -> str:
-        return html_table(self._told())
+        cell = '<td style="text-align:left;padding:2px 10px">{}</td>'  # not every notebook has Jupyter's sheet
+        rows = ("".join(cell.format(escape(text)) for text in row) for row in self._told())
+        body = "".join(f"<tr>{row}</tr>" for row in rows)
+        return f'<table style="font:13px/1.5 system-ui,sans-serif;border-collapse:collapse">{body}</table>'
 
     def _told(self) -> list[tuple[str, str]]:
         """The lines, each as a name and what there is to say of it; the warnings come last."""

@@ -150,7 +150,8 @@ def card_robots():
     """The best grasp of each of four limbs, from above."""
     scan = samples.sample_object(6000).points
     skeleton = skeletonised(scan)
-    grasps = grasp_candidates(skeleton, Gripper(0.25), cone=((0, 0, -1), 60), around=16)
+    grasps = grasp_candidates(skeleton, Gripper(0.25), around=16)
+    grasps = grasps[grasps.approach[:, 2] <= -0.5]
     first = np.sort(np.unique(grasps.branch, return_index=True)[1])[:4]
     best = grasps[first]
     tip = best.position + best.depth[:, None] * best.approach

@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -39,7 +40,8 @@ def say(kind: str, message: str) -> None:
     """Print one line to stderr, yellow for a "warning" and red for an "error"; other kinds are "info" and "debug"."""
     color = {"error": "red", "warning": "yellow"}.get(kind)
     prefix = f"glsk: {kind}: " if color else "glsk: "
-    typer.secho(prefix + visible(" ".join(message.split())), err=True, fg=color, dim=not color)
+    plain = False if os.environ.get("NO_COLOR") else None
+    typer.secho(prefix + visible(" ".join(message.split())), err=True, color=plain, fg=color, dim=not color)
 
 
 def heading(text: str) -> None:

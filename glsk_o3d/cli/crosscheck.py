@@ -47,6 +47,7 @@ def crosscheck(
 
 
 def _save_angles(check: Any, path: Path) -> None:
+    from ..io.colors import ramp
     from ..io.formats import ply
 
-    ply.save(path, {"positions": check.points, "angle": check.angle})
+    ply.save(path, {"positions": check.points, "angle": check.angle, "colors": ramp(check.angle / 90)})

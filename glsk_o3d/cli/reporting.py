@@ -27,7 +27,6 @@ OPTIONS = {
     "cloud=points, or cloud=() to check nothing": "--cloud FILE",
     "pipelines.tree()": "'glsk skeletonize --pipeline tree'",
     "editing.largest_component()": "'glsk edit --largest'",
-    "unit='mm', --unit mm": "--unit mm",
     "save_report and save_preview (--report, --preview)": "--report and --preview",
 }
 """What cures are called in Python, and on the command line."""

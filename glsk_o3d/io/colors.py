@@ -31,13 +31,13 @@ def shades(skeleton: Skeleton, color: ColorChoice, branch: np.ndarray, vertices:
         return np.where((branch >= 0)[:, None], palette[branch % len(palette)], UNKNOWN_GREY)
     if color == "order":
         order = branch_table(skeleton).order if len(branch) else np.zeros(1, int)
-        return _ramp(np.where(branch >= 0, order[branch] / max(order.max(), 1), np.nan))
+        return ramp(np.where(branch >= 0, order[branch] / max(order.max(), 1), np.nan))
     vertices = vertices if vertices.ndim == 2 else vertices[:, None]
     values = _of_vertices(skeleton, color)
-    return _ramp(np.where((vertices >= 0).all(axis=1), values[vertices].mean(axis=1), np.nan))
+    return ramp(np.where((vertices >= 0).all(axis=1), values[vertices].mean(axis=1), np.nan))
 
 
-def _ramp(shown: np.ndarray) -> np.ndarray:
+def ramp(shown: np.ndarray) -> np.ndarray:
     """Colours of numbers from 0 to 1; what is beyond has that of the end, NaN is grey."""
     viridis = require("matplotlib").colormaps["viridis"]
     return np.where(np.isnan(shown)[:, None], UNKNOWN_GREY, viridis(np.nan_to_num(shown))[:, :3])

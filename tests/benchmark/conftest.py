@@ -16,7 +16,7 @@ def drawn():
 
 @pytest.fixture(scope="session")
 def fingerprint():
-    """A few letters that tell arrays apart: numbers to four decimals, so that roundings of any processor do not count."""
+    """A few letters that tell arrays apart: to four decimals, so that roundings of any processor do not count."""
 
     def take(*arrays):
         found = hashlib.sha256()

@@ -8,7 +8,6 @@ import pytest
 
 CHOICE = ("--families", "tubes,trees", "--seeds", "100:102", "--variants", "clean, scan2", "--jobs", 1)
 """Rods in the place of the shapes, of which one cloud of eight is not scored."""
-ONE = ("--families", "tubes", "--variants", "clean", "--jobs", 1)
 
 
 @pytest.fixture

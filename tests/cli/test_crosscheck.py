@@ -33,6 +33,7 @@ def test_what_it_says_and_writes(invoke, scans, tmp_path, check):
     assert lines[-1] == "wrote marked.ply"
     marked = read_tensor_cloud(tmp_path / "marked.ply")
     np.testing.assert_array_equal(marked.point.angle.numpy()[:, 0], check.angle)
+    assert "colors" in marked.point
 
 
 def test_a_mesh_at_fault_is_not_held_against_the_cloud(invoke, tmp_path, write_scan):
