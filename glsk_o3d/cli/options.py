@@ -68,9 +68,7 @@ SkeletonOutput = Annotated[
     ),
 ]
 Preview = Annotated[Path | None, option("PNG", "Also draw cloud and skeleton.")]
-ReportPage = Annotated[
-    Path | None, option("HTML", "Also write a page to look at: turn, zoom, watch the contraction, read.", "--report")
-]
+ReportPage = Annotated[Path | None, option("HTML", "Also write a page to look at: turn, zoom, read.", "--report")]
 CutLoops = Annotated[
     bool, Option("--cut-loops", help=f"Cut loops open for formats that hold only trees ({', '.join(TREE_ENDINGS)}).")
 ]

@@ -63,7 +63,7 @@ class VertexPoints:
         return Members(self.vertex, len(self.skeleton.vertices))
 
 
-LEAST_SHARE = 1e-5  # precision: of the squared normals, above which they say something of a direction: 1/300 of a radian
+LEAST_SHARE = 1e-5  # precision: of the squared normals, above which they tell a direction: 1/300 of a radian
 
 
 class Sections(NamedTuple):
