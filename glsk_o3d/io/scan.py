@@ -105,8 +105,9 @@ def parsed(where: str) -> list[tuple[str, Callable[[Any, Any], Any], Any]]:
     for part in re.split(r"\band\b", where):
         try:
             name, sign, words = re.fullmatch(_COMPARISON, part.strip()).groups()  # type: ignore[union-attr]
-            value = [float(word) for word in words.strip("()[]").split(",") if word] if sign == "in" else float(words)
-        except (AttributeError, ValueError):
+            listed = sign == "in" and re.fullmatch(r"[([](.*)[)\]]", words)[1]  # type: ignore[index]
+            value = float(words) if listed is False else [float(word) for word in listed.split(",") if word]
+        except (AttributeError, TypeError, ValueError):
             raise InvalidParameterError(
                 f"where = {where[:200]!r}: {part.strip()[:80]!r} is not understood: compare attributes with numbers, "
                 "such as 'classification in (2, 5) and z > 1.5'"
