@@ -6,6 +6,7 @@ Prints a table: what was installed, how many seconds and megabytes it took, and 
 command may succeed, or end with a message that names an extra; anything else is an error.
 """
 
+import math
 import re
 import subprocess
 import sys
@@ -18,6 +19,12 @@ ROOT = Path(__file__).resolve().parents[1]
 USERS = ("pictures", "crosscheck", "meshlab", "las", "e57", "graph", "cluster", "full")
 BENCH = "bench"  # the wheel beside it, with glsk-bench
 TABLE = "x,y,z,tree\n" + "".join(f"{x},{y},{z},{x % 2}\n" for x in range(40) for y in (0, 1, 2) for z in (0, 1, 2))
+RING = "".join(  # clean and dense, so that a mesh closes around it
+    f"{(3 + math.cos(v)) * math.cos(u)} {(3 + math.cos(v)) * math.sin(u)} {math.sin(v)}\n"
+    for i in range(72)
+    for j in range(24)
+    for u, v in [(math.pi * (i / 36 + j % 2 / 72), math.pi * j / 12)]
+)
 COMMANDS = """\
 demo
 filters
@@ -43,7 +50,7 @@ benchmark table ours.json
 skeletonize demo/cloud.ply --pipeline s.json -o again.json
 run glskeleton demo/cloud.ply -o g.ply
 run scan_cleanup demo/cloud.ply -o c.ply
-crosscheck demo/cloud.ply
+crosscheck ring.xyz
 info scan.las
 info scan.e57
 """
@@ -65,6 +72,7 @@ def try_extra(wheel: Path, bench: Path, extra: str, folder: Path) -> tuple[float
     here.mkdir()
     megabytes = (size(folder) - before) / 1e6
     (here / "scan.csv").write_text(TABLE)
+    (here / "ring.xyz").write_text(RING)
     for name in ("scan.las", "scan.e57"):
         (here / name).write_bytes(b"none")
     asked, wrong = [], []
