@@ -22,7 +22,7 @@ _SIGNS: dict[str, Callable[[Any, Any], Any]] = {
     **{"==": np.equal, "!=": np.not_equal, "<=": np.less_equal, ">=": np.greater_equal},
     **{"<": np.less, ">": np.greater, "in": np.isin},
 }
-_COMPARISON = r"(\w+)\s*([=!<>]=|[<>]|\bin\b)\s*(.+)"
+_COMPARISON = r"(\w+)\s*(?:([=!<>]=|[<>])\s*(.+)|\bin\b\s*[([](.*)[)\]])"
 
 
 class NoPoints(Exception):
@@ -104,15 +104,14 @@ def parsed(where: str) -> list[tuple[str, Callable[[Any, Any], Any], Any]]:
     found = []
     for part in re.split(r"\band\b", where):
         try:
-            name, sign, words = re.fullmatch(_COMPARISON, part.strip()).groups()  # type: ignore[union-attr]
-            listed = sign == "in" and re.fullmatch(r"[([](.*)[)\]]", words)[1]  # type: ignore[index]
-            value = float(words) if listed is False else [float(word) for word in listed.split(",") if word]
-        except (AttributeError, TypeError, ValueError):
+            name, sign, number, listed = re.fullmatch(_COMPARISON, part.strip()).groups()  # type: ignore[union-attr]
+            value = float(number) if sign else [float(word) for word in listed.split(",") if word]
+        except (AttributeError, ValueError):
             raise InvalidParameterError(
                 f"where = {where[:200]!r}: {part.strip()[:80]!r} is not understood: compare attributes with numbers, "
                 "such as 'classification in (2, 5) and z > 1.5'"
             ) from None
-        found.append((name, _SIGNS[sign], value))
+        found.append((name, _SIGNS[sign or "in"], value))
     return found
 
 
