@@ -14,8 +14,9 @@ from typing import Any
 from ..driver import as_pipeline
 from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ..interop.packages import require_for
+from ..io.paths import unknown_ending
 from ..io.scan import parsed
-from ..io.skeletons import skeleton_ending
+from ..io.skeletons import FORMATS
 from ..pipeline import Filter, Pipeline, parts
 from ..recipes import to_recipe
 from .grid import checked_sizes
@@ -180,11 +181,10 @@ def plan_batch(
 
 def _endings(formats: Sequence[str], preview: bool) -> list[str]:
     """What is written of each skeleton."""
-    try:
-        names = (Path(f"skeleton.{ending.lstrip('.')}") for ending in formats)
-        endings = list(dict.fromkeys(map(skeleton_ending, names))) + [".png"] * preview
-    except FileFormatError as error:
-        raise InvalidParameterError(str(error)) from None
+    endings = list(dict.fromkeys(f".{name.lower().lstrip('.')}" for name in formats))
+    if strange := [ending for ending in endings if ending not in FORMATS]:
+        raise InvalidParameterError(str(unknown_ending(f"format {strange[0]!r}", FORMATS)))
+    endings += [".png"] * preview
     if not endings:
         raise InvalidParameterError("there is nothing to write: give a format")
     for ending in endings:
