@@ -19,7 +19,7 @@ from ..skeleton import NOT_MEASURED, Skeleton
 from .evidence import SurfaceGraph
 from .sections import Sections, VertexPoints, half_axes, measure_sections, normal_moments
 
-FIT_STIFFNESS = 1.0  # fitted: length over which the curve hardly bends, over the half width of its section
+FIT_STIFFNESS = 1.0  # fitted: length over which the curve hardly bends, over the half axis of its section there
 FIT_DIFFUSION = 0.6  # fitted: length over which the places of points are smoothed on the surface, over that
 FIT_WIDEST = 10.0  # fitted: half width over the spacing of the vertices, at most: those in one place have none
 FIT_STAY = 0.1  # fitted: weight of staying where it was, per point
@@ -58,11 +58,12 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
     of squares is least at the middle of the width. Each pass minimises, over all vertices at once,
 
     .. math:: \sum_p (b \cdot (x(p) - p))^2 + (x(p) - p)^T K (x(p) - p)
-        + \sum_v c (\lambda |x_v - chord|^2 + \epsilon |x_v - old|^2 + ((x_v - old) \cdot t)^2)
+        + \sum_v c (|\Lambda (x_v - chord)|^2 + \epsilon |x_v - old|^2 + ((x_v - old) \cdot t)^2)
 
-    with c points at a vertex, and :math:`\lambda = (w / h)^4` with the half width w and the spacing h of the vertices,
-    so that the curve does not bend within a half width. The nearest place of a wiggly curve has its wiggle: it is
-    smoothed on the surface by .6 half widths, and x(p) is the place nearest to that.
+    with c points at a vertex. :math:`\Lambda` is :math:`(w / h)^2` with the half width w and the spacing h of the
+    vertices, so that the curve does not bend within a half width; in the direction of the thickness it has half of that
+    in place of w: a strap bends where it is thin, and not where it is wide. The nearest place of a wiggly curve has its
+    wiggle: it is smoothed on the surface by .6 half widths, and x(p) is the place nearest to that.
 
     K is 0, since the axis of half a tube is off the centroid of its points, but where it is to `settle` the curve:
 
@@ -249,12 +250,14 @@ def _solve(x: np.ndarray, near: _Nearest, p: np.ndarray, pull: np.ndarray, patte
     chord = reach[:, ::-1] / np.maximum(reach.sum(axis=1, keepdims=True), TINY)
     stencil = np.column_stack([np.ones(len(inner)), -chord])
     squared = np.maximum(reach.prod(axis=1), TINY)
-    width = np.minimum(near.width[inner] ** 2, FIT_WIDEST**2 * squared) / squared
-    bend = FIT_STIFFNESS**4 * width**2 * np.maximum(count[inner], 1)
-    bend = bend[:, None, None] * stencil[:, :, None] * stencil[:, None]  # the same for all three coordinates
-    blocks = np.concatenate(
-        [at_edges[0], at_edges[1], at_edges[1], at_edges[2], stay, bend.reshape(-1, 1, 1) * np.eye(3)]
-    )
+    flat = near.sections.half_thickness[inner] / np.maximum(near.sections.half_width[inner], TINY)
+    half = near.width[inner, None] * np.column_stack([np.ones(len(inner)), flat])
+    stiff = np.minimum(FIT_STIFFNESS**2 * half**2 / squared[:, None], FIT_WIDEST**2) ** 2
+    wide, thin = np.maximum(count[inner], 1) * stiff.T
+    flat = unit(np.cross(x[beside[:, 1]] - x[beside[:, 0]], near.sections.across[inner]))
+    stiff = wide[:, None, None] * np.eye(3) + (thin - wide)[:, None, None] * flat[:, :, None] * flat[:, None]
+    bend = (stencil[:, :, None] * stencil[:, None])[..., None, None] * stiff[:, None, None]
+    blocks = np.concatenate([at_edges[0], at_edges[1], at_edges[1], at_edges[2], stay, bend.reshape(-1, 3, 3)])
     return factorised(pattern.matrix(blocks)).solve(right.ravel()).reshape(m, 3)
 
 

@@ -23,9 +23,10 @@ END_REACH = 0.98  # fitted: share of an end's points within its reach: normals a
 END_WINDOW = 1.25  # fitted: radii before the reach from which on points say where the limb stops
 END_BENDING = 0.5  # fitted: weight of going straight on, twice lambda
 END_ROUNDS = 3  # measured: from then on hardly anything moves
-END_TIP = 1.0  # fitted: last radii of a curve that go wherever it stops: a hook is as long
 END_LEFT = 0.25  # fitted: share of a branch from a junction that is left, at least, to say where it leads
 END_POINTS = 4  # derived: fewer cannot say where a limb turns
+END_THINNER = 2 / 3  # derived: over its limb's radius, that of a neck; a round cap of a limb seems to have .76 of it
+ONE_SIDED = 1 / np.pi  # derived: radii from the axis to the mean of points around it, between half a tube's and none
 CURVE_SAMPLES = 64  # derived: places along a parabola that say its length to 1e-3 of the whole
 WAY_SAMPLES = 16  # derived: places along a run that say its direction, several on each of its few edges
 # For points weighted by the cube of c, the cosine of their normals with the axis: on a round cap of radius 1, where c
@@ -41,18 +42,18 @@ def regrow_ends(skeleton: Skeleton) -> Skeleton:
 
     Contraction draws the end of a limb into an edge or a corner of the face that closes it, and the fit follows, since
     the normals of a cap do not say where the axis is. So vertices within 1.75 half widths of where the points stop, and
-    the last radius of the curve, are cut. The limb goes on in the direction t of the two radii behind, with the turn d
-    and the bend k, across t, that the normals n of its sides ask for:
+    those within their own half width of the last one, are cut. The limb goes on in the direction t of the two radii
+    behind, with the turn d and the bend k, across t, that the normals n of its sides ask for:
 
     .. math:: \sum_p w \left((b \cdot (s (t + d) + s^2 k / 2 - p))^2 + \lambda (s^2 |d|^2 + s^4 |k|^2 / 4)\right),
         \quad b = n \times t
 
     with p and its length s along t seen from the last vertex left. A point whose plane passes the curve by half a
     radius counts half, and those beyond the reach do not count. The fit is made three times, each along t + d of the
-    one before. See `_End.tip` for where it stops. No end leaves its points.
+    one before. See `_End.tip` and `_End._cap` for where it stops. No end leaves its points.
 
-    New vertices come behind all others, with the radius and the confidence of the run behind. Points of a vertex that
-    was cut belong to the nearest one of the same end. Loops and vertices without edges stay.
+    New vertices come behind all others, with the radius and the confidence of the run behind, or thinner and thinner.
+    Points of a vertex that was cut belong to the nearest one of the same end. Loops and vertices without edges stay.
     """
     if not len(skeleton.leaves):
         return skeleton
@@ -68,6 +69,7 @@ class _Grown(NamedTuple):
     cut: int  # number along the path of the first vertex that goes
     places: np.ndarray  # (k, 3), of the new vertices, outwards
     run: np.ndarray  # vertices behind the cut
+    thick: float  # largest radius of the last vertex
 
 
 def _ends(skeleton: Skeleton) -> Iterator[tuple[np.ndarray, int, bool]]:
@@ -92,7 +94,8 @@ def _grow(cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int,
     along = arc_lengths(places)
     length = along[-1]
     run, cut, way = _within(along, length, END_SIZE * np.median(radii)), len(path), np.zeros(3)
-    stop = max(length - END_TIP * np.median(radii[run]), length / 2)
+    late = (length - along <= half_widths) & (other | (along >= half_widths))
+    stop = max(along[np.argmax(late)] if late.any() else length, length / 2)
     for _ in range(2):  # how far the points reach is seen along a run that is no part of the cap itself
         radius, wide = np.median(radii[run]), np.median(half_widths[run])
         start = max(stop - END_RUN * radius, 0)
@@ -102,7 +105,7 @@ def _grow(cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int,
         if len(own) < END_POINTS:
             return None
         reach = np.quantile((cloud.points[own] - anchor) @ way, END_REACH)
-        close = ((places - anchor) @ way > reach - END_CUT * wide) | (along > length - END_TIP * radius)
+        close = ((places - anchor) @ way > reach - END_CUT * wide) | late
         close = np.flatnonzero(close & (along > start))
         cut = max(close[0] if len(close) else len(path), first)
         stop = along[cut - 1]
@@ -117,13 +120,13 @@ def _grow(cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int,
         return None
     end = _End.of(points[ahead], cloud.normals[own[ahead]], way, radius)
     behind = _within(along, stop, END_SIZE * radius)
-    tip = end.tip(_Taper.of(along[behind] - stop, radii[behind], radius))
+    tip, thick = end.tip(_Taper.of(along[behind] - stop, radii[behind], radius))
     steps = np.diff(along[run])
     step = np.median(steps) if len(steps) else length / (len(path) - 1)
     tip = max(tip, step / 2)
     # edges of no length are those of no limb
     number = max(round(min(tip / max(step, TINY), len(points))), 1)
-    return _Grown(path, cut, anchor + end.curve(np.arange(1, number + 1) / number * tip), path[run])
+    return _Grown(path, cut, anchor + end.curve(np.arange(1, number + 1) / number * tip), path[run], thick)
 
 
 def _within(along: np.ndarray, stop: float, length: float) -> np.ndarray:
@@ -191,8 +194,38 @@ class _End(NamedTuple):
         step: Floats = np.interp(length, self.along, self.steps) + np.maximum(length - self.along[-1], 0)
         return step[:, None] * self.way + (step**2 / 2)[:, None] * self.bend
 
-    def tip(self, taper: _Taper) -> float:
-        """How far the limb goes on: to half a radius inside a flat cap, or the centre of a round one.
+    def tip(self, taper: _Taper) -> tuple[float, float]:
+        """How far the limb goes on, and the radius that it has there at most.
+
+        Where its last points are much nearer to the axis than it is thick, as on the neck of a bottle, it has the cap
+        of that thinner limb.
+        """
+        reach = float(np.quantile(self.length, END_REACH))
+        thin = self._thinner(taper.at(reach - taper.radius), reach)
+        return self._cap(taper if np.isinf(thin) else _Taper(thin, 0.0), reach), thin
+
+    def _thinner(self, radius: float, reach: float) -> float:
+        """Radius of the last points, those nearer to the reach than it is, if much less than that of the limb.
+
+        Else, and where all are on one side, infinite.
+        """
+        given, centre = radius, np.zeros(3)
+        for _ in range(END_ROUNDS):
+            late = self.length > reach - radius
+            if late.sum() < END_POINTS:
+                break
+            length = self.length[late]
+            tangent = unit(self.way + np.interp(length, self.along, self.steps)[:, None] * self.bend)
+            normals = self.normals[late] - dot(self.normals[late], tangent)[:, None] * tangent
+            away = self.points[late] - self.curve(length)
+            centre = away.mean(axis=0)
+            across = norm(normals) @ np.abs(dot(away, normals)) / max(dot(normals, normals).sum(), TINY)
+            radius = min(radius, float(across))
+        around = np.linalg.norm(centre) < ONE_SIDED * radius
+        return radius if around and radius < END_THINNER * given else np.inf
+
+    def _cap(self, taper: _Taper, reach: float) -> float:
+        """How far it is to half a radius inside a flat cap, or to the centre of a round one.
 
         Let c be the cosine of an outward normal with the axis. The mean length s with the weights c^3 is on a flat cap,
         and .8 radii beyond the centre of a round one; the variance is 0 there and 2/75 squared radii here, so mean - r
@@ -200,7 +233,6 @@ class _End(NamedTuple):
         missing of the cap, of an open pipe all of it, counts as if it were where the sides stop: twice as far as their
         mean.
         """
-        reach: float = np.quantile(self.length, END_REACH)
         start = max(reach - END_WINDOW * taper.at(reach - taper.radius), 0.0)
         late = self.length > start
         if late.sum() < END_POINTS:
@@ -250,13 +282,14 @@ def _replanted(skeleton: Skeleton, grown: list[_Grown]) -> Skeleton:
     low, high = axis_box(skeleton.points[skeleton.supporting_points])
     edges, radii, confidence = [skeleton.edges], [skeleton.radii], [skeleton.confidence]
     planted = [np.clip(found.places, low, high) for found in grown]
-    for (path, cut, _, run), places in zip(grown, planted, strict=True):
+    for (path, cut, _, run, thick), places in zip(grown, planted, strict=True):
         gone, names = path[cut:], m + np.arange(len(places))
         m += len(places)
         keep[gone] = False
         chain = np.concatenate([path[cut - 1 : cut], names])
         edges.append(np.column_stack([chain[:-1], chain[1:]]))
-        radii.append(np.full(len(places), np.median(skeleton.radii[run])))
+        radius = np.median(skeleton.radii[run])
+        radii.append(np.linspace(radius, min(radius, thick), len(places) + 1)[1:])
         confidence.append(np.full(len(places), np.median(skeleton.confidence[run])))
         lost = members.of(gone)
         near = cKDTree(np.concatenate([skeleton.vertices[chain[:1]], places])).query(skeleton.points[lost])[1]

@@ -129,6 +129,19 @@ def test_the_curve_of_a_flat_bar_is_its_midline(wiggle):
     assert np.abs(moved[:, 2]).max() < 0.02
 
 
+def test_a_hoop_bends_where_it_is_thin():
+    """A band .6 wide and .12 thick around a circle of radius .4: its width does not make the curve any smaller."""
+    bar, big, m = strip(wiggle=0), 0.4, 48
+    turn, out = np.pi / 2 * bar.points[:, 0], np.sqrt(big**2 + 2 * big * bar.points[:, 2])  # as dense inside as outside
+    away, rim = np.column_stack([np.cos(turn), np.sin(turn), 0 * turn]), np.arange(m) / m * 2 * np.pi
+    normals = bar.normals[:, 2:] * away + bar.normals[:, 1:2] * [0, 0, 1]
+    points = out[:, None] * away + bar.points[:, 1:2] * [0, 0, 1]
+    vertices = np.column_stack([0.42 * np.cos(rim), 0.42 * np.sin(rim), 0 * rim + 0.02])
+    moved = fit_axis(path(vertices, points, normals, closed=True), 6)[0]
+    assert np.abs(np.hypot(moved[:, 0], moved[:, 1]) - big).max() < 0.2 * 0.06
+    assert np.abs(moved[:, 2]).max() < 0.1 * 0.3
+
+
 @pytest.mark.parametrize(("wide", "thick"), [(0.3, 0.06), (0.2, 0.1)])
 def test_the_section_of_a_flat_bar_is_its_own_and_its_width_is_doubt(wide, thick):
     fitted = axis_fit.fit_axis(strip(wide, thick), 3)

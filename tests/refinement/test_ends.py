@@ -60,6 +60,28 @@ def test_an_end_stops_where_its_limb_does(refine, cap, where, stop, hook):
     np.testing.assert_allclose(found, [LENGTH + where * R, 0, 0], atol=0.15 * R)
 
 
+def bottle(thin, long, n=6000):
+    """A tube of radius R with a neck of that radius and length, and faces at its shoulder and at the end."""
+    rng = np.random.default_rng(0)
+    out, area = turned(n, rng), np.array([R * LENGTH, thin * long, R**2 / 2])
+    part, u = rng.choice(3, (n, 1), p=area / area.sum()), rng.uniform(size=(n, 1))
+    disc = R * np.sqrt(u)
+    radius = np.choose(part, [R, thin, disc])
+    x = np.choose(part, [LENGTH * u, LENGTH + long * u, LENGTH + long * (disc < thin)])
+    normals = np.where(part == 2, [1, 0, 0], out)
+    return radius * out + x * [1, 0, 0], normals * rng.choice([-1, 1], (n, 1))
+
+
+@pytest.mark.parametrize("stop", [-1, 0, 1])
+@pytest.mark.parametrize(("thin", "long"), [(0.3, 1), (0.3, 2), (0.4, 1), (0.4, 1.5)])
+def test_a_neck_goes_on_beyond_its_shoulder(refine, thin, long, stop):
+    """Even one no longer than its limb is thick: the curve ends half its radius inside its face, and as thin as it."""
+    found = refine(fork(*bottle(thin * R, long * R), LENGTH + stop * R), recentre=3)
+    end = np.flatnonzero((found.vertices == tip(found)).all(axis=1))
+    np.testing.assert_allclose(tip(found), [LENGTH + (long - thin / 2) * R, 0, 0], atol=0.1 * R)
+    np.testing.assert_allclose(found.radii[end], thin * R, rtol=0.1)
+
+
 @pytest.mark.parametrize("cap", ["flat", "round"])
 def test_half_a_limb_is_enough(refine, cap):
     """Seen from one side."""
