@@ -22,7 +22,7 @@ class Diffusion:
         row, column = np.repeat(np.arange(n), k - 1), neighbours[:, 1:].ravel()
         links = csr_array((np.full(len(row), 0.5), (row, column)), shape=(n, n))
         self._links = (links + links.T).tocsr()
-        offset = points[row] - points[column]
+        offset = points.take(row, axis=0) - points.take(column, axis=0)
         squared = dot(offset, offset) / 2
         squared = np.bincount(row, squared, n) + np.bincount(column, squared, n)
         self._degree = np.asarray(self._links.sum(axis=1)).ravel()

@@ -86,3 +86,9 @@ def nearest_on_edges(
         some = some[nearer]
         edge[some], t[some], best[some] = column[nearer], part[nearer], squared[nearer]
     return edge, t
+
+
+def places_on_edges(x: np.ndarray, edges: np.ndarray, edge: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """The places, (n, 3) float array, that `nearest_on_edges` names."""
+    start, way = x[edges[:, 0]], x[edges[:, 1]] - x[edges[:, 0]]
+    return start.take(edge, axis=0) + t[:, None] * way.take(edge, axis=0)

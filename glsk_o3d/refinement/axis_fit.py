@@ -11,10 +11,10 @@ from scipy.sparse import bsr_array, csc_array
 
 from ..numerics.groups import group_sum
 from ..numerics.neighbourhoods import nearest_neighbours
-from ..numerics.polylines import incident_edges, nearest_on_edges
+from ..numerics.polylines import incident_edges, nearest_on_edges, places_on_edges
 from ..numerics.radii import plane_distance_radii, robust_radii
 from ..numerics.solver import factorised
-from ..numerics.vectors import COLUMNS, FULL, ROWS, TINY, Floats, dot, norm, unit
+from ..numerics.vectors import COLUMNS, FULL, ROWS, TINY, Floats, cross, dot, norm, unit
 from ..skeleton import NOT_MEASURED, Skeleton
 from .evidence import SurfaceGraph
 from .sections import Sections, VertexPoints, half_axes, measure_sections, normal_moments
@@ -81,38 +81,50 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
     points = skeleton.supporting_points
     points = points[skeleton.degree[skeleton.vertex_of_point[points]] > 0]
     if len(points) == 0:
-        return replace(skeleton, confidence=np.zeros(m), radii=_plane_radii(skeleton, skeleton.vertices))
+        radii = _plane_radii(skeleton, skeleton.vertices, skeleton.vertex_of_point)
+        return replace(skeleton, confidence=np.zeros(m), radii=radii)
     centre = skeleton.vertices.mean(axis=0)
     x, p, n = skeleton.vertices - centre, skeleton.points[points] - centre, skeleton.normals.take(points, axis=0)
     vertex, edges_at = skeleton.vertex_of_point[points], incident_edges(ends, m)
     pattern = _Pattern(skeleton, edges_at)
     low, high = axis_box(p)
-    near = _nearest(x, ends, edges_at[vertex], p, n, p, skeleton.radii)
+    near = _nearest(x, ends, *nearest_on_edges(x, ends, edges_at[vertex], p), p, n, skeleton.radii)
     if passes:
         smooth = _smoother(surface or SurfaceGraph.of(skeleton), points, p)
-    for _ in range(passes):
-        edge, t = nearest_on_edges(x, ends, edges_at[vertex], p)
-        place = x[ends[edge, 0]] + t[:, None] * (x[ends[edge, 1]] - x[ends[edge, 0]])
-        place = smooth(place, FIT_DIFFUSION * near.width[vertex])
-        for _ in range(FIT_WALK):
-            edge, t = nearest_on_edges(x, ends, edges_at[vertex], place)
-            vertex = ends[edge, (t > 0.5).astype(int)]
-        near = _nearest(x, ends, edges_at[vertex], p, n, place, skeleton.radii)
+    for again in range(passes):
+        onto = nearest_on_edges(x, ends, edges_at[vertex], p) if again else (near.edge, near.share[:, 1])
+        place = smooth(places_on_edges(x, ends, *onto), FIT_DIFFUSION * near.width[vertex])
+        vertex, edge, t = _walked(x, ends, edges_at, vertex, place)
+        near = _nearest(x, ends, edge, t, p, n, skeleton.radii)
         pull = _pull(near) if settle else np.zeros((m, 3, 3))
         x = _solve(x, near, p, pull[ends].mean(axis=1), pattern)
         # normals that mean nothing may meet anywhere
         x = np.where(skeleton.degree[:, None] > 0, np.clip(x, low, high), x)
+    owner = skeleton.vertex_of_point.copy()
     if passes:
-        near = _nearest(x, ends, edges_at[vertex], p, n, place, skeleton.radii)
-        owner = skeleton.vertex_of_point.copy()
+        near = _nearest(x, ends, *nearest_on_edges(x, ends, edges_at[vertex], place), p, n, skeleton.radii)
         owner[points] = vertex
-        skeleton = replace(skeleton, vertex_of_point=owner)
-    radii = _plane_radii(skeleton, x + centre)
+    radii = _plane_radii(skeleton, x + centre, owner)
     if passes:  # the distance from a curve that nobody has centred is no radius
         equal = np.where(near.support > 0, near.sections.radius, radii)
         radii = robust_radii(equal, norm(near.offset), near.doubt, n, vertex)
     confidence = (1 - near.doubt) * near.support / (near.support + HALF_SUPPORT)
-    return replace(skeleton, vertices=x + centre, confidence=confidence, radii=radii)
+    return replace(skeleton, vertices=x + centre, confidence=confidence, radii=radii, vertex_of_point=owner)
+
+
+def _walked(
+    x: np.ndarray, ends: np.ndarray, edges_at: np.ndarray, vertex: np.ndarray, place: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The vertex near each place, a few steps from the one it had; and the nearest edge there, and where on it."""
+    vertex, going = vertex.copy(), np.arange(len(place))
+    edge, t = nearest_on_edges(x, ends, edges_at[vertex], place)
+    for _ in range(FIT_WALK):  # only what got to another vertex is asked again
+        ahead = ends[edge[going], (t[going] > 0.5).astype(int)]
+        on = ahead != vertex[going]
+        going = going[on]
+        vertex[going] = ahead[on]
+        edge[going], t[going] = nearest_on_edges(x, ends, edges_at[vertex[going]], place[going])
+    return vertex, edge, t
 
 
 def _smoother(
@@ -139,8 +151,8 @@ def _smoother(
     return smooth
 
 
-def _plane_radii(skeleton: Skeleton, vertices: np.ndarray) -> np.ndarray:
-    return plane_distance_radii(vertices, skeleton.vertex_of_point, skeleton.points, skeleton.normals, skeleton.radii)
+def _plane_radii(skeleton: Skeleton, vertices: np.ndarray, owner: np.ndarray) -> np.ndarray:
+    return plane_distance_radii(vertices, owner, skeleton.points, skeleton.normals, skeleton.radii)
 
 
 def axis_box(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -166,22 +178,14 @@ class _Nearest(NamedTuple):
 
 
 def _nearest(
-    x: np.ndarray,
-    ends: np.ndarray,
-    around: np.ndarray,
-    p: np.ndarray,
-    n: np.ndarray,
-    place: np.ndarray,
-    radii: np.ndarray,
+    x: np.ndarray, ends: np.ndarray, edge: np.ndarray, t: np.ndarray, p: np.ndarray, n: np.ndarray, radii: np.ndarray
 ) -> _Nearest:
-    """Of every point the place of the curve nearest to `place`; the radii are half axes in directions nobody saw."""
-    edge, t = nearest_on_edges(x, ends, around, place)
+    """What every point is to a place of the curve; the radii are half axes in directions nobody saw."""
     share = np.column_stack([1 - t, t])
-    start, way = x[ends[:, 0]], x[ends[:, 1]] - x[ends[:, 0]]
-    tangent = unit(way)
+    tangent = unit(x[ends[:, 1]] - x[ends[:, 0]])
     along = tangent.take(edge, axis=0)
-    across = np.cross(n, along)
-    offset = start.take(edge, axis=0) + t[:, None] * way.take(edge, axis=0) - p
+    across = cross(n, along)
+    offset = places_on_edges(x, ends, edge, t) - p
     miss = dot(across, offset) ** 2
     apart = dot(offset, offset) - dot(offset, along) ** 2
     a, b = ends.T

@@ -14,7 +14,7 @@ from ..numerics.diffusion import Diffusion
 from ..numerics.groups import group_rank
 from ..numerics.morton import morton_order
 from ..numerics.neighbourhoods import nearest_neighbours, uprightness
-from ..numerics.polylines import incident_edges, nearest_on_edges
+from ..numerics.polylines import incident_edges, nearest_on_edges, places_on_edges
 from ..numerics.vectors import TINY, dot
 from ..numerics.winding import AREA_NEIGHBOURS, orient_from_axis, point_areas, winding_number
 from ..skeleton import Skeleton
@@ -74,8 +74,8 @@ class Evidence(SurfaceGraph):
         surface = surface or SurfaceGraph.of(skeleton)
         supporting, points, neighbours = surface.supporting, surface.points, surface.neighbours
         edge, t = _nearest_edges(skeleton, supporting)
-        start, stop = skeleton.vertices[skeleton.edges[edge]].transpose(1, 0, 2)
-        axis = np.where(edge[:, None] >= 0, start + t[:, None] * (stop - start), points)
+        axis = places_on_edges(skeleton.vertices, skeleton.edges, edge, t)
+        axis = np.where(edge[:, None] >= 0, axis, points)
         normals = orient_from_axis(points, skeleton.normals[supporting], axis, neighbours)
         return cls(supporting, points, neighbours, normals, point_areas(points, neighbours))
 
