@@ -123,7 +123,8 @@ def merge_energy(state: Contraction) -> np.ndarray:
         pulled = np.nan_to_num(drop * s0 * moved / (eta * (s0 - s)), nan=0.0, posinf=np.inf, neginf=-np.inf)
     contraction: Floats = (AMPLIFICATION_SQUARED * state.contraction_weight * eta) ** 2 * dot(delta, delta)  # Wen (7)
     attraction: Floats = pulled**2  # Wen (8)
-    curvature: Floats = ((delta - state.rings.mean_over(delta)) ** 2).sum(axis=1)  # Wen (9)
+    curved = delta - state.rings.mean_over(delta)
+    curvature = dot(curved, curved)  # Wen (9)
     return contraction - attraction + CURVATURE_WEIGHT * curvature  # Wen (6)
 
 

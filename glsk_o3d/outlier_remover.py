@@ -7,7 +7,7 @@ import numpy as np
 
 from .numerics.frame import MIN_POINTS
 from .numerics.groups import component_labels
-from .numerics.neighbourhoods import local_outlier_ratio, nearest_neighbours, principal, row_medians
+from .numerics.neighbourhoods import distances, local_outlier_ratio, nearest_neighbours, principal, row_medians
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .points import Points
@@ -58,7 +58,7 @@ class OutlierRemover(Filter[Points]):
             return points
         points.check_whole(self)
         cloud, neighbours = points.cloud, points.neighbours
-        distance = np.linalg.norm(cloud[neighbours] - cloud[:, None], axis=2)
+        distance = distances(cloud, neighbours)
         left, neighbours = inliers(cloud, points.weight, distance, neighbours, self.outlier_factor, MIN_POINTS)
         if len(left) == len(points):
             return points

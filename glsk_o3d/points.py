@@ -14,7 +14,7 @@ from .interop.clouds import cloud_counts, cloud_points, to_point_cloud
 from .numerics.frame import Frame, not_finite, to_working_frame
 from .numerics.grid_sampling import sample_cloud
 from .numerics.neighbourhoods import principal, row_medians
-from .numerics.vectors import TINY, Ints
+from .numerics.vectors import TINY, Ints, finite_rows
 from .report import Report
 
 Some = TypeVar("Some", bound="Representatives")
@@ -154,7 +154,7 @@ class Points(Representatives):
         InvalidCloudError as of `RingBuilder`.
         """
         points = cloud_points(cloud)
-        finite = np.isfinite(points).all(axis=1)
+        finite = finite_rows(points)
         if not (drop_invalid or finite.all()):
             raise not_finite(int((~finite).sum()), len(points), int(finite.argmin()))
         counts, n, dropped = cloud_counts(cloud, finite)

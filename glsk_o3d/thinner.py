@@ -9,7 +9,7 @@ from scipy.sparse import csr_array
 from .numerics.eigen import principal_parts
 from .numerics.neighbourhoods import nearest_left, principal, wide_covariances
 from .numerics.pairing import Pairs, merge_pairs
-from .numerics.vectors import TINY
+from .numerics.vectors import TINY, dot
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .points import Points, default_k
@@ -139,7 +139,8 @@ def thin_nearer(points: np.ndarray, neighbours: np.ndarray, apart: np.ndarray) -
     def choose(pairs: Pairs, mass: np.ndarray) -> Pairs:
         kept, swallowed = pairs
         reach = np.minimum(apart[kept], apart[swallowed])
-        nearer = ((points[kept] - points[swallowed]) ** 2).sum(axis=1) < reach**2
+        way = points.take(kept, axis=0) - points.take(swallowed, axis=0)
+        nearer = dot(way, way) < reach**2
         nearer &= np.count_nonzero(nearer) > LEAST_MERGED * len(points)
         kept, swallowed = kept[nearer], swallowed[nearer]
         swap = mass[kept] < mass[swallowed]

@@ -41,6 +41,15 @@ def nearest_neighbours(points: np.ndarray, k: int, of: np.ndarray | None = None)
     return distance, neighbour
 
 
+def distances(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
+    """Distance of every point (n, 3) to each of its neighbours, (n, k) float array as of `nearest_neighbours`."""
+    squared = np.zeros(neighbours.shape)
+    for x in np.ascontiguousarray(points.T):
+        away = x.take(neighbours) - x[:, None]
+        squared += away * away
+    return np.sqrt(squared)
+
+
 def nearest_left(points: np.ndarray, neighbours: np.ndarray, left: np.ndarray, k: int) -> np.ndarray:
     """The k nearest points of every point left among those left, (m, k) positions among these, nearest first.
 

@@ -4,6 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from .vectors import dot
+
 Pairs = tuple[np.ndarray, np.ndarray]
 """Points that are kept, and for each of them the one that it swallows."""
 
@@ -51,6 +53,6 @@ def mutual_pairs(points: np.ndarray, neighbours: np.ndarray, left: np.ndarray) -
     one = rows[found]
     one = one[(nearest[nearest[one]] == one) & (one < nearest[one])]
     other = nearest[one]
-    room = [((points[neighbours[p, -1]] - points[p]) ** 2).sum(axis=1) for p in (one, other)]
-    swap = room[1] > room[0]
+    ways = [points.take(neighbours[p, -1], axis=0) - points.take(p, axis=0) for p in (one, other)]
+    swap = dot(ways[1], ways[1]) > dot(ways[0], ways[0])
     return np.where(swap, other, one), np.where(swap, one, other)

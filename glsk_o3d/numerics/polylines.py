@@ -12,12 +12,17 @@ POLYLINE_CHUNK = 2**20  # speed: pairs of a point and an edge at a time: memory 
 
 def arc_lengths(path: np.ndarray) -> np.ndarray:
     """Length along a path, (p, 3) float array, from its first place to every place, (p,) float array."""
-    return np.concatenate([[0], np.cumsum(norm(np.diff(path, axis=0)))])
+    lengths = np.zeros(len(path))
+    np.cumsum(norm(path[1:] - path[:-1]), out=lengths[1:])
+    return lengths
 
 
 def place_at(path: np.ndarray, lengths: np.ndarray, length: float | np.ndarray) -> Floats:
     """The place so far along a path, (p, 3) float array with its `arc_lengths`; (3,), or (k, 3) for k lengths."""
-    return np.stack([np.interp(length, lengths, x) for x in path.T], axis=-1)
+    places = np.empty((*np.shape(length), 3))
+    for axis in range(3):
+        places[..., axis] = np.interp(length, lengths, path[:, axis])
+    return places
 
 
 def relative_distance(

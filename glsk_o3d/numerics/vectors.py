@@ -16,8 +16,8 @@ Ints: TypeAlias = np.ndarray[Any, np.dtype[np.integer[Any]]]
 
 def dot(a: np.ndarray, b: np.ndarray) -> Floats:
     """Dot product of each two rows of `a` and `b`, (n, 3) float arrays: (n,) float array."""
-    (x, y, z), (u, v, w) = a.T, b.T
-    return x * u + y * v + z * w
+    products: Floats = a * b
+    return products[:, 0] + products[:, 1] + products[:, 2]
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> Floats:
@@ -34,6 +34,19 @@ def norm(a: np.ndarray) -> Floats:
 def unit(a: Floats) -> Floats:
     """Each row of `a`, (n, 3) float array, over its length; rows of zeros stay."""
     return a / np.maximum(norm(a), TINY)[:, None]
+
+
+def finite_rows(a: np.ndarray) -> np.ndarray:
+    """Which rows of `a`, (n, 3) float array, have no other numbers than finite ones, (n,) bool array."""
+    x, y, z = np.isfinite(a).T
+    found: np.ndarray = x & y & z
+    return found
+
+
+def box(points: np.ndarray) -> tuple[Floats, Floats]:
+    """Lowest and highest coordinates, (3,), of points, (n, 3) float array, n > 0."""
+    columns = np.ascontiguousarray(points.T)  # along the memory it is ten times faster
+    return columns.min(axis=1), columns.max(axis=1)
 
 
 def along_axis(a: np.ndarray, axis: str) -> np.ndarray:

@@ -14,7 +14,7 @@ from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.polylines import incident_edges, nearest_on_edges, places_on_edges
 from ..numerics.radii import plane_distance_radii, robust_radii
 from ..numerics.solver import factorised
-from ..numerics.vectors import COLUMNS, FULL, ROWS, TINY, Floats, cross, dot, norm, unit
+from ..numerics.vectors import COLUMNS, FULL, ROWS, TINY, Floats, box, cross, dot, norm, unit
 from ..skeleton import NOT_MEASURED, Skeleton
 from .evidence import SurfaceGraph
 from .sections import Sections, VertexPoints, half_axes, measure_sections, normal_moments
@@ -157,7 +157,7 @@ def _plane_radii(skeleton: Skeleton, vertices: np.ndarray, owner: np.ndarray) ->
 
 def axis_box(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest coordinates, (3,), that an axis of points, (n, 3) float array, n > 0, may have."""
-    low, high = points.min(axis=0), points.max(axis=0)
+    low, high = box(points)
     slack = FIT_BEYOND * np.linalg.norm(high - low)
     return low - slack, high + slack
 

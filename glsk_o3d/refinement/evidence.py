@@ -15,7 +15,7 @@ from ..numerics.groups import group_rank
 from ..numerics.morton import morton_order
 from ..numerics.neighbourhoods import nearest_neighbours, uprightness
 from ..numerics.polylines import incident_edges, nearest_on_edges, places_on_edges
-from ..numerics.vectors import TINY, dot
+from ..numerics.vectors import TINY, dot, finite_rows
 from ..numerics.winding import AREA_NEIGHBOURS, orient_from_axis, point_areas, winding_number
 from ..skeleton import Skeleton
 
@@ -157,7 +157,7 @@ def in_order(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skelet
     That would show in the last digit of sums, and where one thing is as good as another, as on grids, it decides. In
     the result the points are as they came.
     """
-    finite = np.isfinite(skeleton.points).all(axis=1)
+    finite = finite_rows(skeleton.points)
     some = np.flatnonzero(finite)
     if len(some):
         some = some[morton_order(skeleton.points[some])]
