@@ -112,21 +112,22 @@ def inscribed_circle(points: np.ndarray) -> tuple[np.ndarray, float]:
     low, high = polygon[:, :2].min(axis=0), polygon[:, :2].max(axis=0)
     centre, best = np.zeros(3), 0.0
     at, span = (low + high) / 2, high - low
+    ends = polygon, np.concatenate([polygon[1:], polygon[:1]])  # of its edges
     for n in (21, 11, 11):
         x, y = (np.linspace(-0.5, 0.5, n)[:, None] * span + at).T
         grid = np.stack([*np.meshgrid(x, y), np.zeros((n, n))], axis=-1).reshape(-1, 3)
-        grid = grid[_inside(grid, polygon)]
+        grid = grid[_inside(grid, *ends)]
         if len(grid):
-            distance = _distance(grid, polygon)
+            distance = _distance(grid, *ends)
             if distance.max() > best:
                 best, centre = float(distance.max()), grid[np.argmax(distance)]
         at, span = centre[:2], span / 5
     return centre @ axes + middle, best
 
 
-def _distance(points: np.ndarray, polygon: np.ndarray) -> np.ndarray:
-    """Distance from each point to the closed polygon, (n,) float array."""
-    edge = np.roll(polygon, -1, axis=0) - polygon
+def _distance(points: np.ndarray, polygon: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Distance from each point to the closed polygon, (n,) float array; edges lead to the places `after` its own."""
+    edge = after - polygon
     squared = np.maximum(dot(edge, edge), TINY)
     # products of matrices instead of differences of all pairs; the polygon is centred, so that they lose nothing
     along = points @ edge.T - dot(polygon, edge)
@@ -137,9 +138,8 @@ def _distance(points: np.ndarray, polygon: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(apart.min(axis=1), 0))
 
 
-def _inside(points: np.ndarray, polygon: np.ndarray) -> np.ndarray:
-    """Even-odd test in the first two coordinates."""
-    a, b = polygon, np.roll(polygon, -1, axis=0)
+def _inside(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Even-odd test in the first two coordinates, with the edges from a to b."""
     x, y = points[:, :1], points[:, 1:2]
     rises = (a[:, 1] > y) != (b[:, 1] > y)
     with np.errstate(divide="ignore", invalid="ignore"):

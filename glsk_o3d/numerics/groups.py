@@ -23,6 +23,16 @@ def group_median(values: np.ndarray, group: np.ndarray, n: int) -> Floats:
     return median
 
 
+def quantile(values: np.ndarray, share: float) -> float:
+    """Quantile of some values, (n,) float array, n > 0, as by NumPy, which takes ten times as long for a few."""
+    return float(np.interp(share * (len(values) - 1), np.arange(len(values)), np.sort(values)))
+
+
+def median(values: np.ndarray) -> float:
+    """Median of some values, as `quantile`."""
+    return quantile(values, 0.5)
+
+
 class Members:
     """The members of every group 0 .. n-1; those of a negative group have none."""
 

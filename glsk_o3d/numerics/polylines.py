@@ -7,6 +7,7 @@ import numpy as np
 from .groups import group_rank
 from .vectors import TINY, Floats, dot, norm
 
+ROUNDING = np.finfo(float).eps  # derived: of a number, over itself
 POLYLINE_CHUNK = 2**20  # speed: pairs of a point and an edge at a time: memory stays flat
 
 
@@ -40,20 +41,19 @@ def relative_distance(
     # relative to one of them: products of coordinates far from the origin would cancel
     points, start = points - start[0], start - start[0]
     size = max(np.abs(points).max(), np.abs(start).max())
-    least = max(np.finfo(float).eps * size, TINY)  # of a line, which has no thickness but roundings
+    least = max(ROUNDING * size, TINY)  # of a line, which has no thickness but roundings
     ratio, nearest = np.empty(len(points)), np.empty(len(points))
     rows = max(POLYLINE_CHUNK // len(a), 1)
     for first in range(0, len(points), rows):
         p = points[first : first + rows]
         along = p @ direction.T - dot(start, direction)
-        squared = (p**2).sum(axis=1)[:, None] - 2 * p @ start.T + (start**2).sum(axis=1)
+        squared = dot(p, p)[:, None] - 2 * p @ start.T + dot(start, start)
         foot = np.clip(along, 0, length)
         distance = np.sqrt(np.maximum(squared + foot * (foot - 2 * along), 0))
         there = np.maximum(surface[a] + foot / np.maximum(length, TINY) * (surface[b] - surface[a]), least)
         over = distance / there
-        edge = over.argmin(axis=1)[:, None]
-        ratio[first : first + rows] = np.take_along_axis(over, edge, axis=1)[:, 0]
-        nearest[first : first + rows] = np.take_along_axis(there, edge, axis=1)[:, 0]
+        edge, every = over.argmin(axis=1), np.arange(len(p))
+        ratio[first : first + rows], nearest[first : first + rows] = over[every, edge], there[every, edge]
     return ratio, nearest
 
 

@@ -180,6 +180,8 @@ def _nearest_edges(skeleton: Skeleton, supporting: np.ndarray) -> tuple[np.ndarr
 
 def _first_in_their_place(points: np.ndarray) -> np.ndarray:
     """The first of all points with the same coordinates, bool array: which of them is linked would be chance."""
+    if np.diff(np.sort(points[:, 0])).all():  # mostly, and then they need not be sorted by three coordinates
+        return np.ones(len(points), bool)
     order = np.lexsort(points.T)
     again = (np.diff(points[order], axis=0) == 0).all(axis=1)
     first = np.ones(len(points), bool)

@@ -190,29 +190,34 @@ def meet(
     surface without such a sphere has no say. The junction was `near`, and `radius` is that of the thickest limb there.
     """
     place, touching, radius = near, radius, max(radius, TINY)
+    known = [line for line in lines if line.spread > 0 and line.radius > 0]
+    middle, way = (np.array([line[k] for line in known]).reshape(-1, 3) for k in range(2))
+    spread, noise = np.array([(line.spread, line.bend / line.radius + LINE_NOISE) for line in known]).reshape(-1, 2).T
+    across = np.eye(3) - way[:, :, None] * way[:, None]
     for _ in range(MEETING_ROUNDS):
         matrix, right = np.diag([MEETING_HOLD] * 3 + [1e-6]), np.zeros(4)
         right[:3] = MEETING_HOLD * (near - place)
         right[3] = 1e-6 * touching
-        for line in lines:
-            if line.spread <= 0 or line.radius <= 0:
-                continue
-            offset = line.middle - place
-            aside = offset - (offset @ line.way) * line.way
-            error = (line.bend / line.radius + LINE_NOISE) * (1 + (offset @ line.way / line.spread) ** 2)
-            weight = 1 / ((1 + error**2) * (1 + aside @ aside / radius**2))
-            matrix[:3, :3] += weight * (np.eye(3) - np.outer(line.way, line.way))
-            right[:3] += weight * aside
+        offset = middle - place
+        ahead = dot(offset, way)
+        aside = offset - ahead[:, None] * way
+        error = noise * (1 + (ahead / spread) ** 2)
+        weight = 1 / ((1 + error**2) * (1 + dot(aside, aside) / radius**2))
+        matrix[:3, :3] += (weight[:, None, None] * across).sum(axis=0)
+        right[:3] += weight @ aside
         if len(points):
             offset = points - place
             window = np.exp(-dot(offset, offset) / (2 * radius**2))
             height = dot(offset, normals)
-            fits = window / (1 + ((np.abs(height) - touching) / (SURFACE_FIT * radius)) ** 2)
+            high = np.abs(height)
+            fits = window / (1 + ((high - touching) / (SURFACE_FIT * radius)) ** 2)
             fits *= SURFACE_WEIGHT / max(window.sum(), TINY)
-            plane = np.column_stack([np.where(height < 0, -1, 1)[:, None] * normals, np.ones(len(points))])
-            matrix += (fits[:, None] * plane).T @ plane
-            right += plane.T @ (fits * np.abs(height))
+            # of n with the sign of its height, and 1
+            matrix[:3, :3] += (fits[:, None] * normals).T @ normals
+            matrix[3, :3] = matrix[:3, 3] = np.copysign(fits, height) @ normals
+            matrix[3, 3] += fits.sum()
+            right += [*((fits * height) @ normals), fits @ high]
         *step, touching = np.linalg.solve(matrix, right)
-        touching = float(np.clip(touching, 0, 2 * radius))
+        touching = min(max(touching, 0.0), 2 * radius)
         place = place + step
     return place, touching
