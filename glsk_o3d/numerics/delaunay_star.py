@@ -70,8 +70,10 @@ def delaunay_star(offsets: np.ndarray, valid: np.ndarray | None = None) -> tuple
             if not going.any():
                 break
             if not going.all():
-                rows, first, best, widest = (a[going] for a in (rows, first, best, widest))
-                q, shut, onward, turn, line = q[going], shut[going], onward[going], turn[going], line[: len(rows)]
+                left = np.flatnonzero(going)
+                rows, first, best, widest = (a[left] for a in (rows, first, best, widest))
+                q, shut, onward, turn = (a.take(left, axis=0) for a in (q, shut, onward, turn))
+                line = line[: len(rows)]
             walk[rows, step] = here = best
             way = onward
 

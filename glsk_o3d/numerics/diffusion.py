@@ -32,7 +32,8 @@ class Diffusion:
         """Diffuse `values` (n, c) over a `length` (n,) of each point, by conjugate gradients from the values on."""
         # over less than a thousandth of its links a value stays what it is
         hold = self._stiffness / np.maximum(length**2, 1e-6 * np.maximum(self._stiffness, TINY))
-        diagonal = np.maximum(hold + self._degree, TINY)[:, None]
+        # as wide as the values: NumPy is slow at stretching columns
+        diagonal = np.maximum(hold + self._degree, TINY).repeat(values.shape[1]).reshape(values.shape)
         mean: Floats = values.mean(axis=0)  # what is far from the origin would lose digits
         found: Floats = values - mean
         residual = self._links @ found - self._degree[:, None] * found

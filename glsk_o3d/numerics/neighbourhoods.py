@@ -137,8 +137,8 @@ def uprightness(points: np.ndarray, normals: np.ndarray, p: np.ndarray, q: np.nd
 
     1 where a surface goes on from one point to the other, 0 where two surfaces face each other.
     """
-    line = unit(points[q] - points[p])
-    at_p, at_q = (np.maximum(1 - dot(normals[end], line) ** 2, 0) for end in (p, q))
+    line = unit(points.take(q, axis=0) - points.take(p, axis=0))
+    at_p, at_q = (np.maximum(1 - dot(normals.take(end, axis=0), line) ** 2, 0) for end in (p, q))
     return at_p * at_q
 
 

@@ -77,16 +77,18 @@ def nearest_on_edges(
     `candidates` (n, c) are at least one edge for each point, padded with -1. Returns the edges (n,), and t (n,) from 0
     at the first end of the edge to 1 at the second.
     """
-    starts, ways = x[edges[:, 0]], x[edges[:, 1]] - x[edges[:, 0]]
-    lengths = np.maximum(dot(ways, ways), TINY)  # squared
-    edge, t, best = np.zeros(len(p), int), np.zeros(len(p)), np.full(len(p), np.inf)
+    starts, p = x.T.take(edges[:, 0], axis=1), np.ascontiguousarray(p.T)  # along the memory
+    ways = x.T.take(edges[:, 1], axis=1) - starts
+    lengths = np.maximum((ways * ways).sum(axis=0), TINY)  # squared
+    n = len(candidates)
+    edge, t, best = np.zeros(n, int), np.zeros(n), np.full(n, np.inf)
     for column in candidates.T:
         some = np.flatnonzero(column >= 0)
         column = column[some]
-        along, offset = ways.take(column, axis=0), p.take(some, axis=0) - starts.take(column, axis=0)
-        part = np.clip(dot(along, offset) / lengths.take(column), 0, 1)
-        offset -= part[:, None] * along
-        squared = dot(offset, offset)
+        along, offset = ways.take(column, axis=1), p.take(some, axis=1) - starts.take(column, axis=1)
+        part = np.clip((along * offset).sum(axis=0) / lengths.take(column), 0, 1)
+        offset -= part * along
+        squared = (offset * offset).sum(axis=0)
         nearer = squared < (1 - NEAREST_TIE) * best[some]  # a vertex belongs to all its edges: rounding must not choose
         some = some[nearer]
         edge[some], t[some], best[some] = column[nearer], part[nearer], squared[nearer]

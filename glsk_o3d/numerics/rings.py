@@ -64,7 +64,7 @@ class Rings:
         """Distance from every point to each of its ring neighbours, (m,) float array."""
         squared = np.zeros(len(self.indices))
         for x in points.T:
-            edge = x.take(self.indices) - x.repeat(self.sizes)
+            edge = x.take(self.indices) - x.take(self.centres)
             squared += edge * edge
         return np.sqrt(squared)
 

@@ -48,7 +48,7 @@ class SurfaceGraph:
         step = max(len(supporting) // enough, 1)
         if step > 1:  # which they are must not depend on points that have no say
             supporting = np.sort(supporting[morton_order(skeleton.points[supporting])[::step]])
-        supporting = supporting[_first_in_their_place(skeleton.points[supporting])]
+        supporting = supporting[first_in_their_place(skeleton.points[supporting])]
         points = skeleton.points[supporting]
         if not len(points):
             return cls(supporting, points, np.empty((0, 1), int))
@@ -119,10 +119,12 @@ class Evidence(SurfaceGraph):
     def _bonds(self, skeleton: Skeleton) -> tuple[np.ndarray, np.ndarray]:
         vertex, m = skeleton.vertex_of_point[self.supporting], len(skeleton.vertices)
         p, q = np.repeat(np.arange(len(vertex)), self.neighbours.shape[1] - 1), self.neighbours[:, 1:].ravel()
-        foreign = vertex[p] != vertex[q]
-        p, q = p[foreign], q[foreign]
-        weight = dot(self.normals[p], self.normals[q]) ** 2 * uprightness(self.points, self.normals, p, q)
-        keys = np.minimum(vertex[p], vertex[q]) * m + np.maximum(vertex[p], vertex[q])
+        a, b = vertex[p], vertex[q]
+        foreign = np.flatnonzero(a != b)
+        p, q, a, b = (each.take(foreign) for each in (p, q, a, b))
+        agree = dot(self.normals.take(p, axis=0), self.normals.take(q, axis=0)) ** 2
+        weight = agree * uprightness(self.points, self.normals, p, q)
+        keys = np.minimum(a, b) * m + np.maximum(a, b)
         keys, which = np.unique(keys, return_inverse=True)
         return np.column_stack(np.divmod(keys, m)), np.bincount(which, weight, len(keys))
 
@@ -178,7 +180,7 @@ def _nearest_edges(skeleton: Skeleton, supporting: np.ndarray) -> tuple[np.ndarr
     return np.where(skeleton.degree[vertex] > 0, edge, -1), t
 
 
-def _first_in_their_place(points: np.ndarray) -> np.ndarray:
+def first_in_their_place(points: np.ndarray) -> np.ndarray:
     """The first of all points with the same coordinates, bool array: which of them is linked would be chance."""
     if np.diff(np.sort(points[:, 0])).all():  # mostly, and then they need not be sorted by three coordinates
         return np.ones(len(points), bool)
