@@ -17,6 +17,7 @@ from ..numerics.solver import factorised
 from ..numerics.vectors import COLUMNS, FULL, ROWS, TINY, Floats, box, cross, dot, norm, unit
 from ..skeleton import NOT_MEASURED, Skeleton
 from .evidence import SurfaceGraph
+from .merging import with_fields
 from .sections import Sections, VertexPoints, half_axes, measure_sections, normal_moments
 
 FIT_STIFFNESS = 1.0  # fitted: length over which the curve hardly bends, over the half width of its section
@@ -47,7 +48,7 @@ def pull_back_detached(skeleton: Skeleton) -> Skeleton:
     reach = HALF_TUBE_REACH * np.sqrt(spread / count)
     away = norm(mean)
     back = 1 - np.minimum(reach, away) / np.maximum(away, TINY)
-    return replace(skeleton, vertices=skeleton.vertices + back[:, None] * mean)
+    return with_fields(skeleton, vertices=skeleton.vertices + back[:, None] * mean)
 
 
 def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = None, settle: bool = False) -> Skeleton:
@@ -82,7 +83,7 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
     points = points[skeleton.degree[skeleton.vertex_of_point[points]] > 0]
     if len(points) == 0:
         radii = _plane_radii(skeleton, skeleton.vertices, skeleton.vertex_of_point)
-        return replace(skeleton, confidence=np.zeros(m), radii=radii)
+        return with_fields(skeleton, confidence=np.zeros(m), radii=radii)
     centre = skeleton.vertices.mean(axis=0)
     x, p, n = skeleton.vertices - centre, skeleton.points[points] - centre, skeleton.normals.take(points, axis=0)
     vertex, edges_at = skeleton.vertex_of_point[points], incident_edges(ends, m)
@@ -93,7 +94,7 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
         smooth = _smoother(surface or SurfaceGraph.of(skeleton), points, p)
     for again in range(passes):
         onto = nearest_on_edges(x, ends, edges_at[vertex], p) if again else (near.edge, near.share[:, 1])
-        place = smooth(places_on_edges(x, ends, *onto), FIT_DIFFUSION * near.width[vertex])
+        place = smooth(places_on_edges(x, ends, *onto), FIT_DIFFUSION * near.width()[vertex])
         vertex, edge, t = _walked(x, ends, edges_at, vertex, place)
         near = _nearest(x, ends, edge, t, p, n, skeleton.radii)
         pull = _pull(near) if settle else np.zeros((m, 3, 3))
@@ -109,7 +110,7 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
         equal = np.where(near.support > 0, near.sections.radius, radii)
         radii = robust_radii(equal, norm(near.offset), near.doubt, n, vertex)
     confidence = (1 - near.doubt) * near.support / (near.support + HALF_SUPPORT)
-    return replace(skeleton, vertices=x + centre, confidence=confidence, radii=radii, vertex_of_point=owner)
+    return with_fields(skeleton, vertices=x + centre, confidence=confidence, radii=radii, vertex_of_point=owner)
 
 
 def _walked(
@@ -173,8 +174,14 @@ class _Nearest(NamedTuple):
     doubt: np.ndarray  # d, of every vertex
     support: np.ndarray  # points at every vertex and its neighbours
     sections: Sections  # at every vertex
-    width: np.ndarray  # half of the section's, at every vertex
-    faces: np.ndarray  # (m, 6) different entries of the sum of n n^T, at every vertex and its neighbours
+    moments: np.ndarray  # (m, 6) different entries of the mean of the squared offsets across the curve, there
+    faces: np.ndarray  # (m, 6) different entries of the sum of n n^T, there
+
+    def width(self) -> np.ndarray:
+        """Half width of the section at every vertex, (m,) float array."""
+        # normals of a sheet as thin as its points are apart say nothing of its width, and there is nothing but doubt
+        half = self.sections.half_width
+        return half + self.doubt * np.maximum(_spread_width(self.moments) - half, 0)
 
 
 def _nearest(
@@ -200,10 +207,8 @@ def _nearest(
     apart_at = np.maximum(apart_at, 0)  # but for rounding, a difference of squares
     # normals that point anywhere explain half of the distance; without points there is nothing but doubt
     doubt = np.where(apart_at > 0, np.minimum(2 * miss_at, apart_at) / np.maximum(apart_at, TINY), 1)
-    # normals of a sheet as thin as its points are apart say nothing of its width, and there is nothing but doubt
-    spread = _spread_width(at[:, 15:] / np.maximum(support, TINY)[:, None])
-    width = sections.half_width + doubt * np.maximum(spread - sections.half_width, 0)
-    return _Nearest(edge, share, tangent, across, offset, doubt, support, sections, width, at[:, 3:9])
+    moments = at[:, 15:] / np.maximum(support, TINY)[:, None]
+    return _Nearest(edge, share, tangent, across, offset, doubt, support, sections, moments, at[:, 3:9])
 
 
 def _pull(near: _Nearest) -> np.ndarray:
@@ -253,7 +258,7 @@ def _solve(x: np.ndarray, near: _Nearest, p: np.ndarray, pull: np.ndarray, patte
     chord = reach[:, ::-1] / np.maximum(reach.sum(axis=1, keepdims=True), TINY)
     stencil = np.column_stack([np.ones(len(inner)), -chord])
     squared = np.maximum(reach.prod(axis=1), TINY)
-    width = np.minimum(near.width[inner] ** 2, FIT_WIDEST**2 * squared) / squared
+    width = np.minimum(near.width()[inner] ** 2, FIT_WIDEST**2 * squared) / squared
     bend = FIT_STIFFNESS**4 * width**2 * np.maximum(count[inner], 1)
     bend = bend[:, None, None] * stencil[:, :, None] * stencil[:, None]  # the same for all three coordinates
     blocks = np.concatenate(

@@ -18,6 +18,7 @@ from ..numerics.polylines import incident_edges, nearest_on_edges, places_on_edg
 from ..numerics.vectors import TINY, dot, finite_rows
 from ..numerics.winding import AREA_NEIGHBOURS, orient_from_axis, point_areas, winding_number
 from ..skeleton import Skeleton
+from .merging import with_fields
 
 # fitted: winding number below which an axis is in nothing; .5 on that of a tube seen from one side, .2 in sparse crowns
 LEAST_INSIDE = 0.4
@@ -167,9 +168,9 @@ def in_order(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skelet
     back = np.empty_like(order)
     back[order] = np.arange(len(order))
     vertex, normals = skeleton.vertex_of_point[order], skeleton.normals.take(order, axis=0)
-    made = step(replace(skeleton, points=skeleton.points[order], normals=normals, vertex_of_point=vertex))
+    made = step(with_fields(skeleton, points=skeleton.points[order], normals=normals, vertex_of_point=vertex))
     vertex, normals = made.vertex_of_point[back], made.normals.take(back, axis=0)
-    return replace(made, points=skeleton.points, normals=normals, vertex_of_point=vertex)
+    return with_fields(made, points=skeleton.points, normals=normals, vertex_of_point=vertex)
 
 
 def _nearest_edges(skeleton: Skeleton, supporting: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ from ..numerics.vectors import TINY, dot
 from ..skeleton import Skeleton
 from .axis_fit import axis_box
 from .limbs import AXIS_LEAVES, AXIS_LENGTH, Limbs
-from .merging import merge_into
+from .merging import merge_into, with_fields
 from .sections import VertexPoints
 
 # All fitted, but for the steps.
@@ -133,7 +133,7 @@ def _straightened(skeleton: Skeleton, limbs: Limbs, places: dict[int, _Place]) -
             radius = np.interp(start, along, skeleton.radii[path])
             radii[path[moved]] = radius
             radii[junction] = max(radii[junction], radius)
-    return replace(skeleton, vertices=vertices, radii=radii)
+    return with_fields(skeleton, vertices=vertices, radii=radii)
 
 
 def limb_line(

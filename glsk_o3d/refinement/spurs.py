@@ -2,7 +2,6 @@
 
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +14,7 @@ from ..numerics.vectors import TINY, cross, norm, unit
 from ..skeleton import Skeleton
 from .evidence import Evidence
 from .limbs import Limbs
-from .merging import merge_into
+from .merging import merge_into, with_fields
 from .sections import VertexPoints, measure_sections
 
 SPUR_POINTS = 128  # speed: of a branch that are enough to say how far it reaches
@@ -53,14 +52,14 @@ def prune_spurs(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
             for twig in worst.values() or found
         ]
         if not worst:
-            return replace(skeleton, normals=given.normals), decisions
+            return with_fields(skeleton, normals=given.normals), decisions
         group = np.arange(len(skeleton.vertices))
         for twig in worst.values():
             group[twig.body] = twig.junction
         # points of a cut branch are farther from its junction than the surface there is: they have no say any more
         gone = np.isin(skeleton.vertex_of_point, np.concatenate([twig.body for twig in worst.values()]))
         normals = np.where(gone[:, None], np.nan, skeleton.normals)
-        skeleton = merge_into(replace(skeleton, normals=normals), group)
+        skeleton = merge_into(with_fields(skeleton, normals=normals), group)
 
 
 def limb_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[int, dict[str, float]]]:
