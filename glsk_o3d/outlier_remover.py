@@ -101,9 +101,9 @@ def in_floating_cluster(points: np.ndarray, weight: np.ndarray, mean: np.ndarray
     They are far from their neighbours, a distance `mean` (n,), for what is some steps away, or anywhere if they are an
     island; and together they fill space, or are a handful alone. A sparse surface is flat, and a sparse limb long.
     """
-    densest = row_medians(mean.take(neighbours))
+    densest, each = row_medians(mean.take(neighbours)), np.ascontiguousarray(neighbours.T)
     for _ in range(DENSEST_HOPS):
-        densest = densest.take(neighbours).min(axis=1)
+        densest = densest.take(each).min(axis=0)
     island, sparse = np.zeros(len(points), bool), mean > FLOATING_RATIO * np.median(mean)
     if sparse.any():
         near = neighbours[:, 1:5]

@@ -44,7 +44,7 @@ def final_representatives(representative: np.ndarray) -> np.ndarray:
 def mutual_pairs(points: np.ndarray, neighbours: np.ndarray, left: np.ndarray) -> Pairs:
     """Pairs of points left that are each other's nearest; of each pair the one with more room around it is kept."""
     rows = np.flatnonzero(left)
-    candidates = neighbours[rows, 1:]
+    candidates = neighbours.take(rows, axis=0)[:, 1:]
     there = left.take(candidates)
     first = np.argmax(there, axis=1)
     found = there[np.arange(len(rows)), first]

@@ -149,6 +149,7 @@ def on_sample(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skele
     points, vertex = skeleton.points[rows], skeleton.vertex_of_point[rows]
     made = step(replace(skeleton, points=points, normals=skeleton.normals[rows], vertex_of_point=vertex))
     owned = np.flatnonzero(skeleton.vertex_of_point >= 0)
+    owned = owned[morton_order(skeleton.points[owned])]  # the tree is quicker with what is near in turn
     owner = np.full(len(skeleton.points), -1)
     owner[owned] = made.vertex_of_point[cKDTree(points).query(skeleton.points[owned])[1]]
     return replace(made, points=skeleton.points, normals=skeleton.normals, vertex_of_point=owner)
