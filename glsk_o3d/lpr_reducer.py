@@ -152,8 +152,7 @@ def match_feasible(state: Contraction, representatives: np.ndarray, swallowed: n
     made only for pairs that the matching takes; it is repeated without those found wanting until there are none, which
     gives the same pairs as if these had never been there. Returns the representatives and their rings after the merge.
     """
-    rings = Rings.concatenate([])
-    ring_of = np.full(len(state), -1)
+    rings, ring_of = Rings.concatenate([]), np.full(len(state), -1)
     feasible = np.ones(len(representatives), bool)
     while True:
         left = np.flatnonzero(feasible)

@@ -202,16 +202,14 @@ class Points(Representatives):
         `neighbours` are those of the remaining rows, as positions among these.
         """
         first, aside = self.point_of_survivor, self._of_points(gone) > 0
-        kept = np.flatnonzero(self.sampled & ~aside)
-        position = np.full(len(self.points), -1)
+        kept, position = np.flatnonzero(self.sampled & ~aside), np.full(len(self.points), -1)
         position[kept] = np.arange(len(kept))
         left = position[first]
         place = np.where(aside, -1, self._of_points(left))
         place[kept] = np.arange(len(kept))
         by, known = ("box" if self.frame.mean is None else "spread"), None
         if len(kept) == np.count_nonzero(~gone):  # copies in a frame that far ones made wide may be none in their own
-            rows = left[~gone]
-            known = np.empty_like(neighbours)
+            rows, known = left[~gone], np.empty_like(neighbours)
             known[rows] = rows[neighbours]
         weight = np.ones(len(kept))
         weight[left[~gone]] = self.weight[~gone]

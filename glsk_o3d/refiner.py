@@ -119,7 +119,7 @@ class Refiner(Filter[Skeleton]):
         settled: dict[str, Skeleton] = {}  # what each question was last asked about
         for about in ORDER_OF_QUESTIONS:
             if settled.get(about) is not skeleton:
-                skeleton, found = self._asked(about, skeleton, evidence, surface)
+                skeleton, found = self._asked(about, skeleton, evidence)
                 decisions[about] = _changed(decisions[about]) + found
                 settled[about] = skeleton
         report = replace(
@@ -131,15 +131,13 @@ class Refiner(Filter[Skeleton]):
         )
         return with_fields(skeleton, report=report)
 
-    def _asked(
-        self, about: str, skeleton: Skeleton, evidence: Evidence, surface: SurfaceGraph
-    ) -> tuple[Skeleton, list[Decision]]:
+    def _asked(self, about: str, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Decision]]:
         """A skeleton after a question was answered for its parts, with the curve fitted anew if it was changed."""
         limit = getattr(self, QUESTIONS[about].option)
         if not limit:
             return skeleton, []
         answered, found = ANSWERS[about](skeleton, evidence, limit)
-        return (self._centred(answered, surface) if _changed(found) else skeleton), found
+        return (self._centred(answered, evidence) if _changed(found) else skeleton), found
 
     def _centred(self, skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
         if self.spacing:

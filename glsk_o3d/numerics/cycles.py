@@ -29,8 +29,7 @@ def minimum_cycle_basis(n: int, edges: np.ndarray, lengths: np.ndarray) -> list[
 def _cyclic_chains(n: int, edges: np.ndarray, lengths: np.ndarray) -> list[Chain]:
     """Paths between junctions of the cyclic part. A ring of its own starts anywhere."""
     while True:
-        paths = maximal_paths(n, edges)
-        degree = np.bincount(edges.ravel(), minlength=n)
+        paths, degree = maximal_paths(n, edges), np.bincount(edges.ravel(), minlength=n)
         cyclic = [(vertices, path) for vertices, path in paths if degree[[vertices[0], vertices[-1]]].min() > 1]
         if len(cyclic) == len(paths):
             return [(float(np.cumsum(lengths[path])[-1]), vertices) for vertices, path in paths]
@@ -51,8 +50,7 @@ def _horton(chains: list[Chain]) -> list[Chain]:
     for e in order[::-1].tolist():  # of parallel chains the shortest stays
         a, b = ends[e].tolist()
         shortest[a, b] = shortest[b, a] = e
-    m = len(junctions)
-    keys = np.array(list(shortest))
+    m, keys = len(junctions), np.array(list(shortest))
     graph = csr_matrix((lengths[list(shortest.values())], keys.T), shape=(m, m))
     distance, before = dijkstra(graph, return_predecessors=True)
     component = len({int(np.argmax(np.isfinite(row))) for row in distance})

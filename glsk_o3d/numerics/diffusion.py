@@ -45,8 +45,7 @@ class Diffusion:
             if not bend > LEAST_BEND * size:
                 break
             share = size / bend
-            found = found + share * ahead
-            residual = residual - share * curved
+            found, residual = found + share * ahead, residual - share * curved
             step = residual / diagonal
             before, size = size, (residual * step).sum()
             ahead = step + size / before * ahead

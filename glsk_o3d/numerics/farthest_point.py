@@ -14,8 +14,7 @@ def farthest_point_sampling(points: np.ndarray, radius: np.ndarray) -> tuple[np.
     nor on how they are turned. Returns the samples (m,) in the order taken, and for every point the position of the
     sample nearest to it, (n,).
     """
-    tree = cKDTree(points)
-    nearest = np.full(len(points), np.inf)
+    tree, nearest = cKDTree(points), np.full(len(points), np.inf)
     representative = np.zeros(len(points), int)
     away = points - points.mean(axis=0)
     sample = int(np.argmax(dot(away, away)))

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InvalidCloudError
 from .morton import morton_order
 from .neighbourhoods import nearest_neighbours
-from .vectors import box, dot
+from .vectors import box, dot, norm
 
 FRAME_SIDE = 1.6  # published: longest side of the box
 CLOUD_SLACK = 1.2  # published: how much larger than the cloud the contracted one may be
@@ -51,8 +51,7 @@ class Frame:
         inner -= mean
         variance = np.linalg.eigvalsh(inner.T @ inner / len(inner))  # of a box with sides a, b, c: a^2 / 12, ...
         side, diagonal = np.sqrt(12 * np.array([variance[2], variance.sum()]))
-        reach = np.sqrt(dot(inner, inner).max())
-        unit = side / FRAME_SIDE
+        reach, unit = np.sqrt(dot(inner, inner).max()), side / FRAME_SIDE
         scale = longest * unit
         return cls(centre, float(scale), half / scale, float(diagonal / unit), mean / unit, float(reach / unit))
 
@@ -64,8 +63,7 @@ class Frame:
         """
         if self.mean is None:
             return (np.abs(points) > np.maximum(CLOUD_SLACK * self.half_extent, FLAT_BOX * self.diagonal)).any(axis=1)
-        away = points - self.mean
-        return dot(away, away) > (CLOUD_SLACK * self.reach) ** 2
+        return norm(points - self.mean) > CLOUD_SLACK * self.reach
 
     def into(self, points: np.ndarray) -> np.ndarray:
         """User's units to the frame."""

@@ -59,8 +59,7 @@ def nearest_left(points: np.ndarray, neighbours: np.ndarray, left: np.ndarray, k
     known = neighbours[rows]
     there = left.take(known)
     rank = np.cumsum(there, axis=1, dtype=np.int16)
-    enough = rank[:, -1] >= k
-    found = np.empty((len(rows), k), int)
+    enough, found = rank[:, -1] >= k, np.empty((len(rows), k), int)
     found[enough] = index[known[enough][(there & (rank <= k))[enough]]].reshape(-1, k)
     if not enough.all():
         found[~enough] = nearest_neighbours(points[rows], k, of=points[rows[~enough]])[1]

@@ -47,8 +47,7 @@ def mutual_pairs(points: np.ndarray, neighbours: np.ndarray, left: np.ndarray) -
     candidates = neighbours.take(rows, axis=0)[:, 1:]
     there = left.take(candidates)
     first = np.argmax(there, axis=1)
-    found = there[np.arange(len(rows)), first]
-    nearest = np.full(len(points), -1)
+    found, nearest = there[np.arange(len(rows)), first], np.full(len(points), -1)
     nearest[rows[found]] = candidates[found, first[found]]
     one = rows[found]
     one = one[(nearest[nearest[one]] == one) & (one < nearest[one])]

@@ -77,11 +77,10 @@ def nearest_on_edges(
     `candidates` (n, c) are at least one edge for each point, padded with -1. Returns the edges (n,), and t (n,) from 0
     at the first end of the edge to 1 at the second.
     """
+    edge, t, best = np.zeros(len(p), int), np.zeros(len(p)), np.full(len(p), np.inf)
     starts, p = x.T.take(edges[:, 0], axis=1), np.ascontiguousarray(p.T)  # along the memory
     ways = x.T.take(edges[:, 1], axis=1) - starts
     lengths = np.maximum((ways * ways).sum(axis=0), TINY)  # squared
-    n = len(candidates)
-    edge, t, best = np.zeros(n, int), np.zeros(n), np.full(n, np.inf)
     for column in candidates.T:
         some = np.flatnonzero(column >= 0)
         column = column[some]

@@ -105,8 +105,7 @@ class Rings:
 
     def replace(self, points: np.ndarray, rings: Rings) -> Rings:
         """These rings with those of `points` replaced by `rings`."""
-        both = Rings.concatenate([self, rings])
-        source = np.arange(len(self))
+        both, source = Rings.concatenate([self, rings]), np.arange(len(self))
         source[points] = len(self) + np.arange(len(rings))
         return both.take(source)
 

@@ -45,8 +45,7 @@ def pull_back_detached(skeleton: Skeleton) -> Skeleton:
     count = np.maximum(cloud.count, 1)
     mean = group_sum(cloud.offset, cloud.vertex, m) / count[:, None]
     spread = group_sum((cloud.points - (skeleton.vertices + mean)[cloud.vertex]) ** 2, cloud.vertex, m).sum(axis=1)
-    reach = HALF_TUBE_REACH * np.sqrt(spread / count)
-    away = norm(mean)
+    reach, away = HALF_TUBE_REACH * np.sqrt(spread / count), norm(mean)
     back = 1 - np.minimum(reach, away) / np.maximum(away, TINY)
     return with_fields(skeleton, vertices=skeleton.vertices + back[:, None] * mean)
 
@@ -79,14 +78,14 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
     the vertex nearest to their place.
     """
     m, ends = len(skeleton.vertices), skeleton.edges
-    points = skeleton.supporting_points
-    points = points[skeleton.degree[skeleton.vertex_of_point[points]] > 0]
+    points, owner = skeleton.supporting_points, skeleton.vertex_of_point.copy()
+    points = points[skeleton.degree[owner[points]] > 0]
     if len(points) == 0:
-        radii = _plane_radii(skeleton, skeleton.vertices, skeleton.vertex_of_point)
+        radii = plane_distance_radii(skeleton.vertices, owner, skeleton.points, skeleton.normals, skeleton.radii)
         return with_fields(skeleton, confidence=np.zeros(m), radii=radii)
     centre = skeleton.vertices.mean(axis=0)
     x, p, n = skeleton.vertices - centre, skeleton.points[points] - centre, skeleton.normals.take(points, axis=0)
-    vertex, edges_at = skeleton.vertex_of_point[points], incident_edges(ends, m)
+    vertex, edges_at = owner[points], incident_edges(ends, m)
     pattern = _Pattern(skeleton, edges_at)
     low, high = axis_box(p)
     near = _nearest(x, ends, *nearest_on_edges(x, ends, edges_at[vertex], p), p, n, skeleton.radii)
@@ -94,18 +93,17 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
         smooth = _smoother(surface or SurfaceGraph.of(skeleton), points, p)
     for again in range(passes):
         onto = nearest_on_edges(x, ends, edges_at[vertex], p) if again else (near.edge, near.share[:, 1])
-        place = smooth(places_on_edges(x, ends, *onto), FIT_DIFFUSION * near.width()[vertex])
+        place = smooth(places_on_edges(x, ends, *onto), FIT_DIFFUSION * near.width[vertex])
         vertex, edge, t = _walked(x, ends, edges_at, vertex, place)
         near = _nearest(x, ends, edge, t, p, n, skeleton.radii)
         pull = _pull(near) if settle else np.zeros((m, 3, 3))
         x = _solve(x, near, p, pull[ends].mean(axis=1), pattern)
         # normals that mean nothing may meet anywhere
         x = np.where(skeleton.degree[:, None] > 0, np.clip(x, low, high), x)
-    owner = skeleton.vertex_of_point.copy()
     if passes:
         near = _nearest(x, ends, *nearest_on_edges(x, ends, edges_at[vertex], place), p, n, skeleton.radii)
         owner[points] = vertex
-    radii = _plane_radii(skeleton, x + centre, owner)
+    radii = plane_distance_radii(x + centre, owner, skeleton.points, skeleton.normals, skeleton.radii)
     if passes:  # the distance from a curve that nobody has centred is no radius
         equal = np.where(near.support > 0, near.sections.radius, radii)
         radii = robust_radii(equal, norm(near.offset), near.doubt, n, vertex)
@@ -152,10 +150,6 @@ def _smoother(
     return smooth
 
 
-def _plane_radii(skeleton: Skeleton, vertices: np.ndarray, owner: np.ndarray) -> np.ndarray:
-    return plane_distance_radii(vertices, owner, skeleton.points, skeleton.normals, skeleton.radii)
-
-
 def axis_box(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest coordinates, (3,), that an axis of points, (n, 3) float array, n > 0, may have."""
     low, high = box(points)
@@ -174,27 +168,18 @@ class _Nearest(NamedTuple):
     doubt: np.ndarray  # d, of every vertex
     support: np.ndarray  # points at every vertex and its neighbours
     sections: Sections  # at every vertex
-    moments: np.ndarray  # (m, 6) different entries of the mean of the squared offsets across the curve, there
-    faces: np.ndarray  # (m, 6) different entries of the sum of n n^T, there
-
-    def width(self) -> np.ndarray:
-        """Half width of the section at every vertex, (m,) float array."""
-        # normals of a sheet as thin as its points are apart say nothing of its width, and there is nothing but doubt
-        half = self.sections.half_width
-        return half + self.doubt * np.maximum(_spread_width(self.moments) - half, 0)
+    width: np.ndarray  # half of the section's, at every vertex
+    faces: np.ndarray  # (m, 6) different entries of the sum of n n^T, at every vertex and its neighbours
 
 
 def _nearest(
     x: np.ndarray, ends: np.ndarray, edge: np.ndarray, t: np.ndarray, p: np.ndarray, n: np.ndarray, radii: np.ndarray
 ) -> _Nearest:
     """What every point is to a place of the curve; the radii are half axes in directions nobody saw."""
-    share = np.column_stack([1 - t, t])
-    tangent = unit(x[ends[:, 1]] - x[ends[:, 0]])
+    share, tangent = np.column_stack([1 - t, t]), unit(x[ends[:, 1]] - x[ends[:, 0]])
     along = tangent.take(edge, axis=0)
-    across = cross(n, along)
-    offset = places_on_edges(x, ends, edge, t) - p
-    miss = dot(across, offset) ** 2
-    apart = dot(offset, offset) - dot(offset, along) ** 2
+    across, offset = cross(n, along), places_on_edges(x, ends, edge, t) - p
+    miss, apart = dot(across, offset) ** 2, dot(offset, offset) - dot(offset, along) ** 2
     a, b = ends.T
     aside = offset - dot(offset, along)[:, None] * along
     squares = aside[:, ROWS] * aside[:, COLUMNS]
@@ -207,8 +192,10 @@ def _nearest(
     apart_at = np.maximum(apart_at, 0)  # but for rounding, a difference of squares
     # normals that point anywhere explain half of the distance; without points there is nothing but doubt
     doubt = np.where(apart_at > 0, np.minimum(2 * miss_at, apart_at) / np.maximum(apart_at, TINY), 1)
-    moments = at[:, 15:] / np.maximum(support, TINY)[:, None]
-    return _Nearest(edge, share, tangent, across, offset, doubt, support, sections, moments, at[:, 3:9])
+    # normals of a sheet as thin as its points are apart say nothing of its width, and there is nothing but doubt
+    spread = _spread_width(at[:, 15:] / np.maximum(support, TINY)[:, None])
+    width = sections.half_width + doubt * np.maximum(spread - sections.half_width, 0)
+    return _Nearest(edge, share, tangent, across, offset, doubt, support, sections, width, at[:, 3:9])
 
 
 def _pull(near: _Nearest) -> np.ndarray:
@@ -258,7 +245,7 @@ def _solve(x: np.ndarray, near: _Nearest, p: np.ndarray, pull: np.ndarray, patte
     chord = reach[:, ::-1] / np.maximum(reach.sum(axis=1, keepdims=True), TINY)
     stencil = np.column_stack([np.ones(len(inner)), -chord])
     squared = np.maximum(reach.prod(axis=1), TINY)
-    width = np.minimum(near.width()[inner] ** 2, FIT_WIDEST**2 * squared) / squared
+    width = np.minimum(near.width[inner] ** 2, FIT_WIDEST**2 * squared) / squared
     bend = FIT_STIFFNESS**4 * width**2 * np.maximum(count[inner], 1)
     bend = bend[:, None, None] * stencil[:, :, None] * stencil[:, None]  # the same for all three coordinates
     blocks = np.concatenate(
@@ -297,22 +284,20 @@ def subdivide_edges(skeleton: Skeleton, spacing: float) -> Skeleton:
 
     No edge is longer than `spacing` times the mean radius of its ends, but where points are few: a piece for 8.
     """
-    ends = skeleton.edges
-    m = len(skeleton.vertices)
-    radii = measure_sections(skeleton).radius
-    length = np.maximum(spacing * radii[ends].mean(axis=1), np.maximum(1e-3 * skeleton.edge_lengths, TINY))
+    ends, m = skeleton.edges, len(skeleton.vertices)
+    half = measure_sections(skeleton).radius[ends].mean(axis=1)
+    length = np.maximum(spacing * half, np.maximum(1e-3 * skeleton.edge_lengths, TINY))
     points = (VertexPoints(skeleton).mass / np.maximum(skeleton.degree, 1))[ends].sum(axis=1)
     most = np.maximum(points / POINTS_PER_PIECE, 1)
     pieces = np.ceil(np.clip(skeleton.edge_lengths / length, 1, most)).astype(int)  # also edges of no length are one
     inner = pieces - 1
     edge = np.repeat(np.arange(len(ends)), inner)
     step = np.arange(len(edge)) - np.repeat(np.cumsum(inner) - inner, inner) + 1
-    t = (step / pieces[edge])[:, None]
-    a, b = skeleton.vertices[ends[edge, 0]], skeleton.vertices[ends[edge, 1]]
-    vertices = np.concatenate([skeleton.vertices, (1 - t) * a + t * b])
+    share = np.column_stack([1 - step / pieces[edge], step / pieces[edge]])
+    vertices = np.concatenate([skeleton.vertices, (share[:, :, None] * skeleton.vertices[ends[edge]]).sum(axis=1)])
+    radii = np.concatenate([skeleton.radii, (share * skeleton.radii[ends[edge]]).sum(axis=1)])
 
-    first = m + np.cumsum(inner) - inner
-    chain = np.repeat(np.arange(len(ends)), pieces)
+    first, chain = m + np.cumsum(inner) - inner, np.repeat(np.arange(len(ends)), pieces)
     k = np.arange(len(chain)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
     start = np.where(k == 0, ends[chain, 0], first[chain] + k - 1)
     stop = np.where(k == inner[chain], ends[chain, 1], first[chain] + k)
@@ -337,8 +322,5 @@ def subdivide_edges(skeleton: Skeleton, spacing: float) -> Skeleton:
             nearer = distance < best[some]
             choice[some[nearer]], best[some[nearer]] = sample[nearer], distance[nearer]
         vertex_of_point[part] = choice
-    radii = np.concatenate(
-        [skeleton.radii, ((1 - t[:, 0]) * skeleton.radii[ends[edge, 0]] + t[:, 0] * skeleton.radii[ends[edge, 1]])]
-    )
     made = dict(vertices=vertices, edges=edges, radii=radii, vertex_of_point=vertex_of_point)
     return replace(skeleton, **NOT_MEASURED | made)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..numerics.groups import Members, median, quantile
+from ..numerics.groups import Members, quantile
 from ..numerics.neighbourhoods import plane_axes
 from ..numerics.polylines import arc_lengths, place_at
 from ..numerics.vectors import TINY, Floats, cross, dot, norm, unit
@@ -92,10 +92,10 @@ def _grow(cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int,
     places, radii, half_widths = cloud.skeleton.vertices[path], sections.radius[path], sections.half_width[path]
     along = arc_lengths(places)
     length = along[-1]
-    run, cut, way = _within(along, length, END_SIZE * median(radii)), len(path), np.zeros(3)
-    stop = max(length - END_TIP * median(radii[run]), length / 2)
+    run, cut, way = _within(along, length, END_SIZE * np.median(radii)), len(path), np.zeros(3)
+    stop = max(length - END_TIP * np.median(radii[run]), length / 2)
     for _ in range(2):  # how far the points reach is seen along a run that is no part of the cap itself
-        radius, wide = median(radii[run]), median(half_widths[run])
+        radius, wide = np.median(radii[run]), np.median(half_widths[run])
         start = max(stop - END_RUN * radius, 0)
         way, anchor = _way(places, along, start, stop), place_at(places, along, stop)
         # the points of a junction are other limbs', too
@@ -108,7 +108,7 @@ def _grow(cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int,
         cut = max(close[0] if len(close) else len(path), first)
         stop = along[cut - 1]
         run = _within(along, stop, END_SIZE * radius)
-    radius, anchor = median(radii[run]), places[cut - 1]
+    radius, anchor = np.median(radii[run]), places[cut - 1]
     if stop > radius / 2:  # of a stub there is no run: it goes on as it was
         way = _way(places, along, max(stop - END_RUN * radius, 0), stop)
     own = cloud.members.of(path[max(cut - 2, 0 if other else min(1, len(path) - 1)) :])
@@ -120,7 +120,7 @@ def _grow(cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int,
     behind = _within(along, stop, END_SIZE * radius)
     tip = end.tip(_Taper.of(along[behind] - stop, radii[behind], radius))
     steps = np.diff(along[run])
-    step = median(steps) if len(steps) else length / (len(path) - 1)
+    step = np.median(steps) if len(steps) else length / (len(path) - 1)
     tip = max(tip, step / 2)
     # edges of no length are those of no limb
     number = max(round(min(tip / max(step, TINY), len(points))), 1)
@@ -230,16 +230,14 @@ def _turn_and_bend(
 ) -> np.ndarray:
     """How a limb from the origin in a direction turns aside there, and how it bends, (2, 3) float array."""
     length, across = points @ way, cross(normals, way)
-    powers = np.stack([length, length**2 / 2], axis=1)
-    miss = dot(across, points)
+    powers, miss = np.stack([length, length**2 / 2], axis=1), dot(across, points)
     left = miss - powers[:, 1] * (across @ bend)
     weight = (length <= quantile(length, END_REACH)) * radius**2 / (radius**2 + 4 * left**2 + TINY)
-    frame = plane_axes(way[None])[0].T
+    frame: Floats = plane_axes(way[None])[0].T
     ask = (powers[:, :, None] * (across @ frame.T)[:, None]).reshape(-1, 4)
     stiff = END_BENDING / 2 * (weight @ powers**2).repeat(2)
-    found = np.linalg.solve((weight[:, None] * ask).T @ ask + np.diag(stiff + TINY), (weight * miss) @ ask)
-    turned: Floats = found.reshape(2, 2) @ frame
-    return turned
+    found: Floats = np.linalg.solve((weight[:, None] * ask).T @ ask + np.diag(stiff + TINY), (weight * miss) @ ask)
+    return found.reshape(2, 2) @ frame
 
 
 def _replanted(skeleton: Skeleton, grown: list[_Grown]) -> Skeleton:
@@ -258,8 +256,8 @@ def _replanted(skeleton: Skeleton, grown: list[_Grown]) -> Skeleton:
         keep[gone] = False
         chain = np.concatenate([path[cut - 1 : cut], names])
         edges.append(np.column_stack([chain[:-1], chain[1:]]))
-        radii.append(np.full(len(places), median(skeleton.radii[run])))
-        confidence.append(np.full(len(places), median(skeleton.confidence[run])))
+        radii.append(np.full(len(places), np.median(skeleton.radii[run])))
+        confidence.append(np.full(len(places), np.median(skeleton.confidence[run])))
         lost = members.of(gone)
         near = cKDTree(np.concatenate([skeleton.vertices[chain[:1]], places])).query(skeleton.points[lost])[1]
         owner[lost] = chain[near]

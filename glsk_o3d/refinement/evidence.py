@@ -75,10 +75,11 @@ class Evidence(SurfaceGraph):
         surface = surface or SurfaceGraph.of(skeleton)
         supporting, points, neighbours = surface.supporting, surface.points, surface.neighbours
         edge, t = _nearest_edges(skeleton, supporting)
-        axis = places_on_edges(skeleton.vertices, skeleton.edges, edge, t)
-        axis = np.where(edge[:, None] >= 0, axis, points)
+        axis = np.where(edge[:, None] >= 0, places_on_edges(skeleton.vertices, skeleton.edges, edge, t), points)
         normals = orient_from_axis(points, skeleton.normals[supporting], axis, neighbours)
-        return cls(supporting, points, neighbours, normals, point_areas(points, neighbours))
+        made = cls(supporting, points, neighbours, normals, point_areas(points, neighbours))
+        vars(made)["diffusion"] = surface.diffusion  # over the same links
+        return made
 
     def winding(self, queries: np.ndarray) -> np.ndarray:
         """Winding number of the surface around each place, (m,) float array from (m, 3): near 1 inside, 0 outside."""
@@ -187,7 +188,6 @@ def first_in_their_place(points: np.ndarray) -> np.ndarray:
     if np.diff(np.sort(points[:, 0])).all():  # mostly, and then they need not be sorted by three coordinates
         return np.ones(len(points), bool)
     order = np.lexsort(points.T)
-    again = (np.diff(points[order], axis=0) == 0).all(axis=1)
-    first = np.ones(len(points), bool)
+    again, first = (np.diff(points[order], axis=0) == 0).all(axis=1), np.ones(len(points), bool)
     first[order[1:][again]] = False
     return first

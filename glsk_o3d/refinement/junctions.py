@@ -152,8 +152,7 @@ def limb_line(
     n = max(int(np.ceil(along[-1] / step)), 8)
     step, half = along[-1] / n, n // 2
     at = (np.arange(n) + 0.5) * step
-    curve = place_at(places, along, at)
-    clear = np.ones(n)
+    curve, clear = place_at(places, along, at), np.ones(n)
     if others:
         left, _ = relative_distance(curve, vertices, surface, others)
         clear = np.clip((left - 1) / (2 * (AXIS_LEAVES - 1)), 0, 1)
@@ -200,15 +199,13 @@ def meet(
         right[3] = 1e-6 * touching
         offset = middle - place
         ahead = dot(offset, way)
-        aside = offset - ahead[:, None] * way
-        error = noise * (1 + (ahead / spread) ** 2)
+        aside, error = offset - ahead[:, None] * way, noise * (1 + (ahead / spread) ** 2)
         weight = 1 / ((1 + error**2) * (1 + dot(aside, aside) / radius**2))
         matrix[:3, :3] += (weight[:, None, None] * across).sum(axis=0)
         right[:3] += weight @ aside
         if len(points):
             offset = points - place
-            window = np.exp(-dot(offset, offset) / (2 * radius**2))
-            height = dot(offset, normals)
+            window, height = np.exp(-dot(offset, offset) / (2 * radius**2)), dot(offset, normals)
             high = np.abs(height)
             fits = window / (1 + ((high - touching) / (SURFACE_FIT * radius)) ** 2)
             fits *= SURFACE_WEIGHT / max(window.sum(), TINY)

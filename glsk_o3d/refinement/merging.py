@@ -109,12 +109,9 @@ def collapse_triangles(skeleton: Skeleton, by_degree: bool = False) -> Skeleton:
 
     queue = [(*cost(a, b), a, b) for a, b in skeleton.edges.tolist() if around[a] & around[b]]
     heapq.heapify(queue)
-    queued = set(queue)
     representative = list(range(len(position)))
     while queue:
-        entry = heapq.heappop(queue)
-        queued.discard(entry)
-        *priced, a, b = entry
+        *priced, a, b = heapq.heappop(queue)
         if b not in around[a] or not around[a] & around[b]:
             continue
         if tuple(priced) != cost(a, b):
@@ -133,7 +130,6 @@ def collapse_triangles(skeleton: Skeleton, by_degree: bool = False) -> Skeleton:
         # The merge changes the degrees around it and makes new triangles: price all that may have become cheaper.
         for c in {a, *around[a]}:
             for d in around[c]:
-                if around[c] & around[d] and (entry := (*cost(c, d), c, d)) not in queued:
-                    heapq.heappush(queue, entry)
-                    queued.add(entry)
+                if around[c] & around[d]:
+                    heapq.heappush(queue, (*cost(c, d), c, d))
     return merge_vertices(skeleton, final_representatives(np.array(representative, int)))
