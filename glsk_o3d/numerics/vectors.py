@@ -17,7 +17,7 @@ Ints: TypeAlias = np.ndarray[Any, np.dtype[np.integer[Any]]]
 def dot(a: np.ndarray, b: np.ndarray) -> Floats:
     """Dot product of each two rows of `a` and `b`, (n, 3) float arrays: (n,) float array."""
     products: Floats = a * b
-    return products[:, 0] + products[:, 1] + products[:, 2]
+    return products[..., 0] + products[..., 1] + products[..., 2]
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> Floats:
