@@ -137,8 +137,7 @@ class Contractor(Filter[Contraction]):
             line = explained_variance(state.positions, state.rings) > LINE_VARIANCE
             attraction = np.where(line, self.line_hold, 1) * attraction
         attraction = np.clip(attraction, self.min_attraction, self.max_attraction)
-        laplacian = laplacian_of(state)
-        mass = np.sqrt(state.mass)
+        laplacian, mass = laplacian_of(state), np.sqrt(state.mass)
         positions, facts = self._solve_in_box(state, laplacian, contraction / mass, attraction, mass)
         _, ring_size = state.rings.nearest(positions)
         contracted = replace(

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from .numerics.eigen import main_direction
 from .numerics.frame import MIN_POINTS
 from .numerics.groups import group_sum
-from .numerics.neighbourhoods import local_outlier_ratio, nearest_left, nearest_moved, nearest_neighbours
+from .numerics.neighbourhoods import distances, local_outlier_ratio, nearest_left, nearest_moved, nearest_neighbours
 from .numerics.pairing import Pairs, merge_pairs
 from .numerics.vectors import PAIRS
 from .parameters import documented, parameter
@@ -84,8 +84,7 @@ def to_ridges(points: Points, passes: int) -> Points:
     denoised = subspace_mean_shift(points.cloud, points.noise, passes, points.weight)
     k = points.neighbours.shape[1]
     neighbours = nearest_moved(denoised, points.neighbours, points.noise > 0)
-    away = denoised[neighbours[:, 1:]] - denoised[:, None]
-    mean_distance = np.sqrt(np.einsum("nki,nki->nk", away, away)).mean(axis=1)
+    mean_distance = distances(denoised, neighbours[:, 1:]).mean(axis=1)
     outlier = (local_outlier_ratio(mean_distance, neighbours) > DENOISED_RATIO) & (points.noise > DENOISED_NOISE)
     if outlier.sum() > len(denoised) - max(k, MIN_POINTS):  # too few would be left
         outlier[:] = False

@@ -123,7 +123,8 @@ def merge_energy(state: Contraction) -> np.ndarray:
         pulled = np.nan_to_num(drop * s0 * moved / (eta * (s0 - s)), nan=0.0, posinf=np.inf, neginf=-np.inf)
     contraction: Floats = (AMPLIFICATION_SQUARED * state.contraction_weight * eta) ** 2 * dot(delta, delta)  # Wen (7)
     attraction: Floats = pulled**2  # Wen (8)
-    curvature: Floats = ((delta - state.rings.mean_over(delta)) ** 2).sum(axis=1)  # Wen (9)
+    curved = delta - state.rings.mean_over(delta)
+    curvature = dot(curved, curved)  # Wen (9)
     return contraction - attraction + CURVATURE_WEIGHT * curvature  # Wen (6)
 
 
@@ -151,8 +152,7 @@ def match_feasible(state: Contraction, representatives: np.ndarray, swallowed: n
     made only for pairs that the matching takes; it is repeated without those found wanting until there are none, which
     gives the same pairs as if these had never been there. Returns the representatives and their rings after the merge.
     """
-    rings = Rings.concatenate([])
-    ring_of = np.full(len(state), -1)
+    rings, ring_of = Rings.concatenate([]), np.full(len(state), -1)
     feasible = np.ones(len(representatives), bool)
     while True:
         left = np.flatnonzero(feasible)

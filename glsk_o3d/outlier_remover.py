@@ -7,7 +7,7 @@ import numpy as np
 
 from .numerics.frame import MIN_POINTS
 from .numerics.groups import component_labels
-from .numerics.neighbourhoods import local_outlier_ratio, nearest_neighbours, principal, row_medians
+from .numerics.neighbourhoods import distances, local_outlier_ratio, nearest_neighbours, principal, row_medians
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .points import Points
@@ -58,7 +58,7 @@ class OutlierRemover(Filter[Points]):
             return points
         points.check_whole(self)
         cloud, neighbours = points.cloud, points.neighbours
-        distance = np.linalg.norm(cloud[neighbours] - cloud[:, None], axis=2)
+        distance = distances(cloud, neighbours)
         left, neighbours = inliers(cloud, points.weight, distance, neighbours, self.outlier_factor, MIN_POINTS)
         if len(left) == len(points):
             return points
@@ -101,9 +101,9 @@ def in_floating_cluster(points: np.ndarray, weight: np.ndarray, mean: np.ndarray
     They are far from their neighbours, a distance `mean` (n,), for what is some steps away, or anywhere if they are an
     island; and together they fill space, or are a handful alone. A sparse surface is flat, and a sparse limb long.
     """
-    densest = row_medians(mean.take(neighbours))
+    densest, each = row_medians(mean.take(neighbours)), np.ascontiguousarray(neighbours.T)
     for _ in range(DENSEST_HOPS):
-        densest = densest.take(neighbours).min(axis=1)
+        densest = densest.take(each).min(axis=0)
     island, sparse = np.zeros(len(points), bool), mean > FLOATING_RATIO * np.median(mean)
     if sparse.any():
         near = neighbours[:, 1:5]

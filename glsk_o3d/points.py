@@ -14,7 +14,7 @@ from .interop.clouds import cloud_counts, cloud_points, to_point_cloud
 from .numerics.frame import Frame, not_finite, to_working_frame
 from .numerics.grid_sampling import sample_cloud
 from .numerics.neighbourhoods import principal, row_medians
-from .numerics.vectors import TINY, Ints
+from .numerics.vectors import TINY, Ints, finite_rows
 from .report import Report
 
 Some = TypeVar("Some", bound="Representatives")
@@ -154,7 +154,7 @@ class Points(Representatives):
         InvalidCloudError as of `RingBuilder`.
         """
         points = cloud_points(cloud)
-        finite = np.isfinite(points).all(axis=1)
+        finite = finite_rows(points)
         if not (drop_invalid or finite.all()):
             raise not_finite(int((~finite).sum()), len(points), int(finite.argmin()))
         counts, n, dropped = cloud_counts(cloud, finite)
@@ -202,16 +202,14 @@ class Points(Representatives):
         `neighbours` are those of the remaining rows, as positions among these.
         """
         first, aside = self.point_of_survivor, self._of_points(gone) > 0
-        kept = np.flatnonzero(self.sampled & ~aside)
-        position = np.full(len(self.points), -1)
+        kept, position = np.flatnonzero(self.sampled & ~aside), np.full(len(self.points), -1)
         position[kept] = np.arange(len(kept))
         left = position[first]
         place = np.where(aside, -1, self._of_points(left))
         place[kept] = np.arange(len(kept))
         by, known = ("box" if self.frame.mean is None else "spread"), None
         if len(kept) == np.count_nonzero(~gone):  # copies in a frame that far ones made wide may be none in their own
-            rows = left[~gone]
-            known = np.empty_like(neighbours)
+            rows, known = left[~gone], np.empty_like(neighbours)
             known[rows] = rows[neighbours]
         weight = np.ones(len(kept))
         weight[left[~gone]] = self.weight[~gone]

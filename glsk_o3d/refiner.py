@@ -14,7 +14,7 @@ from .refinement.ends import regrow_ends
 from .refinement.evidence import Evidence, SurfaceGraph, in_order, on_sample
 from .refinement.junctions import move_junctions
 from .refinement.loops import close_loops
-from .refinement.merging import binary_size, collapse_triangles, scaled
+from .refinement.merging import binary_size, collapse_triangles, scaled, with_fields
 from .refinement.spurs import prune_spurs
 from .skeleton import Skeleton
 
@@ -129,7 +129,7 @@ class Refiner(Filter[Skeleton]):
             n_cuts=len(_changed(decisions["air"])),
             n_bridges=len(_changed(decisions["gap"])),
         )
-        return replace(skeleton, report=report)
+        return with_fields(skeleton, report=report)
 
     def _asked(self, about: str, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Decision]]:
         """A skeleton after a question was answered for its parts, with the curve fitted anew if it was changed."""

@@ -129,7 +129,7 @@ class Skeleton:
         """Edges at every vertex, (M,) int array."""
         return np.bincount(self.edges.ravel(), minlength=len(self.vertices))
 
-    @property
+    @cached_property
     def supporting_points(self) -> np.ndarray:
         """Input points with a vertex and a normal, which determine the skeleton, int array."""
         return supporting_points(self.vertex_of_point, self.normals)
@@ -164,7 +164,7 @@ class Skeleton:
         """Total length of the edges, in the cloud's units."""
         return float(self.edge_lengths.sum())
 
-    @property
+    @cached_property
     def edge_lengths(self) -> np.ndarray:
         """Length of every edge, (E,) float array."""
         ends = self.vertices[self.edges]

@@ -9,7 +9,7 @@ from scipy.sparse import csr_array
 from .numerics.eigen import principal_parts
 from .numerics.neighbourhoods import nearest_left, principal, wide_covariances
 from .numerics.pairing import Pairs, merge_pairs
-from .numerics.vectors import TINY
+from .numerics.vectors import TINY, norm
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .points import Points, default_k
@@ -96,8 +96,7 @@ class Thinner(Filter[Points]):
 
 def _merged(points: Points, representative: np.ndarray) -> Points:
     """What is left when survivors are merged into others."""
-    kept = representative == np.arange(len(representative))
-    here = points.cloud[points.survivors]
+    kept, here = representative == np.arange(len(representative)), points.cloud[points.survivors]
     neighbours = nearest_left(here, points.neighbours, kept, default_k(int(kept.sum())))
     spread, normals = principal(here[kept], neighbours)
     return points.merged_into(representative, neighbours=neighbours, spread=spread, ring_normals=normals)
@@ -139,7 +138,7 @@ def thin_nearer(points: np.ndarray, neighbours: np.ndarray, apart: np.ndarray) -
     def choose(pairs: Pairs, mass: np.ndarray) -> Pairs:
         kept, swallowed = pairs
         reach = np.minimum(apart[kept], apart[swallowed])
-        nearer = ((points[kept] - points[swallowed]) ** 2).sum(axis=1) < reach**2
+        nearer = norm(points.take(kept, axis=0) - points.take(swallowed, axis=0)) < reach
         nearer &= np.count_nonzero(nearer) > LEAST_MERGED * len(points)
         kept, swallowed = kept[nearer], swallowed[nearer]
         swap = mass[kept] < mass[swallowed]

@@ -1,7 +1,5 @@
 """A circle through points of which some do not lie on it."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Forest measures of a tree: height, stem, volume by order; and doubts about them."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import dataclass
 from typing import Any

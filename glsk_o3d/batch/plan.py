@@ -1,7 +1,5 @@
 """Finding out what a batch has to do, and what is done already."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

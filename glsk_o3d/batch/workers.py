@@ -1,7 +1,5 @@
 """Where the work is done: processes of this machine, or a Dask cluster."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

@@ -1,7 +1,5 @@
 """``glsk edit``, ``glsk convert`` and ``glsk rig``: skeletons from file to file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 

@@ -1,7 +1,5 @@
 """``glsk branches`` and ``glsk tree``: what can be measured of a skeleton."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated

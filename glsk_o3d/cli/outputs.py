@@ -1,7 +1,5 @@
 """The files that commands write: whether they can be written, before computing; and what was, after it."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from collections.abc import Callable, Iterable, Mapping

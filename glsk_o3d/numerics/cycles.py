@@ -29,8 +29,7 @@ def minimum_cycle_basis(n: int, edges: np.ndarray, lengths: np.ndarray) -> list[
 def _cyclic_chains(n: int, edges: np.ndarray, lengths: np.ndarray) -> list[Chain]:
     """Paths between junctions of the cyclic part. A ring of its own starts anywhere."""
     while True:
-        paths = maximal_paths(n, edges)
-        degree = np.bincount(edges.ravel(), minlength=n)
+        paths, degree = maximal_paths(n, edges), np.bincount(edges.ravel(), minlength=n)
         cyclic = [(vertices, path) for vertices, path in paths if degree[[vertices[0], vertices[-1]]].min() > 1]
         if len(cyclic) == len(paths):
             return [(float(np.cumsum(lengths[path])[-1]), vertices) for vertices, path in paths]
@@ -51,8 +50,7 @@ def _horton(chains: list[Chain]) -> list[Chain]:
     for e in order[::-1].tolist():  # of parallel chains the shortest stays
         a, b = ends[e].tolist()
         shortest[a, b] = shortest[b, a] = e
-    m = len(junctions)
-    keys = np.array(list(shortest))
+    m, keys = len(junctions), np.array(list(shortest))
     graph = csr_matrix((lengths[list(shortest.values())], keys.T), shape=(m, m))
     distance, before = dijkstra(graph, return_predecessors=True)
     component = len({int(np.argmax(np.isfinite(row))) for row in distance})
@@ -112,21 +110,22 @@ def inscribed_circle(points: np.ndarray) -> tuple[np.ndarray, float]:
     low, high = polygon[:, :2].min(axis=0), polygon[:, :2].max(axis=0)
     centre, best = np.zeros(3), 0.0
     at, span = (low + high) / 2, high - low
+    ends = polygon, np.concatenate([polygon[1:], polygon[:1]])  # of its edges
     for n in (21, 11, 11):
         x, y = (np.linspace(-0.5, 0.5, n)[:, None] * span + at).T
         grid = np.stack([*np.meshgrid(x, y), np.zeros((n, n))], axis=-1).reshape(-1, 3)
-        grid = grid[_inside(grid, polygon)]
+        grid = grid[_inside(grid, *ends)]
         if len(grid):
-            distance = _distance(grid, polygon)
+            distance = _distance(grid, *ends)
             if distance.max() > best:
                 best, centre = float(distance.max()), grid[np.argmax(distance)]
         at, span = centre[:2], span / 5
     return centre @ axes + middle, best
 
 
-def _distance(points: np.ndarray, polygon: np.ndarray) -> np.ndarray:
-    """Distance from each point to the closed polygon, (n,) float array."""
-    edge = np.roll(polygon, -1, axis=0) - polygon
+def _distance(points: np.ndarray, polygon: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Distance from each point to the closed polygon, (n,) float array; edges lead to the places `after` its own."""
+    edge = after - polygon
     squared = np.maximum(dot(edge, edge), TINY)
     # products of matrices instead of differences of all pairs; the polygon is centred, so that they lose nothing
     along = points @ edge.T - dot(polygon, edge)
@@ -137,9 +136,8 @@ def _distance(points: np.ndarray, polygon: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(apart.min(axis=1), 0))
 
 
-def _inside(points: np.ndarray, polygon: np.ndarray) -> np.ndarray:
-    """Even-odd test in the first two coordinates."""
-    a, b = polygon, np.roll(polygon, -1, axis=0)
+def _inside(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Even-odd test in the first two coordinates, with the edges from a to b."""
     x, y = points[:, :1], points[:, 1:2]
     rises = (a[:, 1] > y) != (b[:, 1] > y)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -44,8 +44,7 @@ def delaunay_star(offsets: np.ndarray, valid: np.ndarray | None = None) -> tuple
     walk[:, 0] = start
     rows = np.flatnonzero(usable.any(axis=1))
     q, shut, first = q[rows], shut[rows], start[rows]
-    here = first
-    line = np.arange(len(rows))
+    here, line = first, np.arange(len(rows))
     # The farthest image is a hull corner; everything lies to the left of its tangent.
     ahead = 1j * q[line, here]
     widest = 2 * np.abs(ahead)
@@ -70,8 +69,9 @@ def delaunay_star(offsets: np.ndarray, valid: np.ndarray | None = None) -> tuple
             if not going.any():
                 break
             if not going.all():
-                rows, first, best, widest = (a[going] for a in (rows, first, best, widest))
-                q, shut, onward, turn, line = q[going], shut[going], onward[going], turn[going], line[: len(rows)]
+                left = np.flatnonzero(going)
+                rows, first, best, widest, line = *(a[left] for a in (rows, first, best, widest)), line[: len(left)]
+                q, shut, onward, turn = (a.take(left, axis=0) for a in (q, shut, onward, turn))
             walk[rows, step] = here = best
             way = onward
 
@@ -95,8 +95,7 @@ def _seen(q: np.ndarray, line: np.ndarray, here: np.ndarray, ahead: np.ndarray) 
 
 def _farthest(way: np.ndarray, usable: np.ndarray, best: np.ndarray) -> np.ndarray:
     """Among the images on one hull edge with the best one, the farthest; but never step over the origin."""
-    line = np.arange(len(best))
-    length = np.abs(way)
+    line, length = np.arange(len(best)), np.abs(way)
     turn = way * way[line, best].conj()[:, None]
     same = np.abs(turn.imag) <= COLLINEAR_SINE * length[line, best][:, None] * length
     reach = np.where(same & usable & (turn.real > 0), length, -1.0)

@@ -22,7 +22,7 @@ class Diffusion:
         row, column = np.repeat(np.arange(n), k - 1), neighbours[:, 1:].ravel()
         links = csr_array((np.full(len(row), 0.5), (row, column)), shape=(n, n))
         self._links = (links + links.T).tocsr()
-        offset = points[row] - points[column]
+        offset = points.take(row, axis=0) - points.take(column, axis=0)
         squared = dot(offset, offset) / 2
         squared = np.bincount(row, squared, n) + np.bincount(column, squared, n)
         self._degree = np.asarray(self._links.sum(axis=1)).ravel()
@@ -32,7 +32,8 @@ class Diffusion:
         """Diffuse `values` (n, c) over a `length` (n,) of each point, by conjugate gradients from the values on."""
         # over less than a thousandth of its links a value stays what it is
         hold = self._stiffness / np.maximum(length**2, 1e-6 * np.maximum(self._stiffness, TINY))
-        diagonal = np.maximum(hold + self._degree, TINY)[:, None]
+        # as wide as the values: NumPy is slow at stretching columns
+        diagonal = np.maximum(hold + self._degree, TINY).repeat(values.shape[1]).reshape(values.shape)
         mean: Floats = values.mean(axis=0)  # what is far from the origin would lose digits
         found: Floats = values - mean
         residual = self._links @ found - self._degree[:, None] * found
@@ -44,8 +45,7 @@ class Diffusion:
             if not bend > LEAST_BEND * size:
                 break
             share = size / bend
-            found = found + share * ahead
-            residual = residual - share * curved
+            found, residual = found + share * ahead, residual - share * curved
             step = residual / diagonal
             before, size = size, (residual * step).sum()
             ahead = step + size / before * ahead

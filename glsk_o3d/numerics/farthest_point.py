@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .vectors import norm
+from .vectors import dot, norm
 
 
 def farthest_point_sampling(points: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -14,10 +14,10 @@ def farthest_point_sampling(points: np.ndarray, radius: np.ndarray) -> tuple[np.
     nor on how they are turned. Returns the samples (m,) in the order taken, and for every point the position of the
     sample nearest to it, (n,).
     """
-    tree = cKDTree(points)
-    nearest = np.full(len(points), np.inf)
+    tree, nearest = cKDTree(points), np.full(len(points), np.inf)
     representative = np.zeros(len(points), int)
-    sample = int(np.argmax(((points - points.mean(axis=0)) ** 2).sum(axis=1)))
+    away = points - points.mean(axis=0)
+    sample = int(np.argmax(dot(away, away)))
     samples: list[int] = []
     while nearest[sample] > 1:
         # Only points nearer to the new sample than the farthest point is to the old ones can change hands.

@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import InvalidCloudError
 from .morton import morton_order
 from .neighbourhoods import nearest_neighbours
+from .vectors import box, dot, norm
 
 FRAME_SIDE = 1.6  # published: longest side of the box
 CLOUD_SLACK = 1.2  # published: how much larger than the cloud the contracted one may be
@@ -38,7 +39,7 @@ class Frame:
         `by` is "box" for the axis-aligned bounding box, as published, or "spread" for the box that has the points'
         spread if it is evenly filled, whose longest side and diagonal do not change when the cloud is turned.
         """
-        low, high = points.min(axis=0), points.max(axis=0)
+        low, high = box(points)
         # Half the difference first: the sum of two large coordinates would cost a digit.
         half = (high - low) / 2
         centre, longest = low + half, 2 * half.max()
@@ -50,8 +51,7 @@ class Frame:
         inner -= mean
         variance = np.linalg.eigvalsh(inner.T @ inner / len(inner))  # of a box with sides a, b, c: a^2 / 12, ...
         side, diagonal = np.sqrt(12 * np.array([variance[2], variance.sum()]))
-        reach = np.sqrt((inner**2).sum(axis=1).max())
-        unit = side / FRAME_SIDE
+        reach, unit = np.sqrt(dot(inner, inner).max()), side / FRAME_SIDE
         scale = longest * unit
         return cls(centre, float(scale), half / scale, float(diagonal / unit), mean / unit, float(reach / unit))
 
@@ -63,7 +63,7 @@ class Frame:
         """
         if self.mean is None:
             return (np.abs(points) > np.maximum(CLOUD_SLACK * self.half_extent, FLAT_BOX * self.diagonal)).any(axis=1)
-        return ((points - self.mean) ** 2).sum(axis=1) > (CLOUD_SLACK * self.reach) ** 2
+        return norm(points - self.mean) > CLOUD_SLACK * self.reach
 
     def into(self, points: np.ndarray) -> np.ndarray:
         """User's units to the frame."""
@@ -131,13 +131,14 @@ def check_extent(points: np.ndarray, n: int | None = None) -> None:
 
     `points` may be two corners of the box of n of them.
     """
+    low, high = box(points)
     with np.errstate(over="ignore"):
-        extent = np.ptp(points, axis=0).max()
+        extent = (high - low).max()
     if extent == 0:
         raise InvalidCloudError(f"all {n or len(points)} points coincide: there is nothing to skeletonise")
     if not MIN_EXTENT < extent < MAX_EXTENT:
         raise InvalidCloudError(f"the cloud is {extent:g} long, and its square is out of range: rescale it")
-    away = np.abs(points).max()
+    away = max(high.max(), -low.min())
     if extent < MIN_STEPS * np.spacing(away):
         raise InvalidCloudError(
             f"the cloud is {extent:g} long and {away:g} away from the origin, where numbers are {np.spacing(away):g} "

@@ -1,7 +1,5 @@
 """A sample that stands for a large cloud: of one in memory, and of one that comes in blocks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from typing import NamedTuple, TypeAlias
 

@@ -15,12 +15,16 @@ def group_median(values: np.ndarray, group: np.ndarray, n: int) -> Floats:
     # NumPy sorts small integers by their digits: ten times faster than lexsort
     ordered = values[order[np.argsort(group[order].astype(np.min_scalar_type(n)), kind="stable")]]
     count = np.bincount(group, minlength=n)
-    last = np.cumsum(count)
-    median = np.zeros(n)
+    last, median = np.cumsum(count), np.zeros(n)
     has = count > 0
     low, high = (last - count + (count - 1) // 2)[has], (last - count + count // 2)[has]
     median[has] = (ordered[low] + ordered[high]) / 2
     return median
+
+
+def quantile(values: np.ndarray, share: float = 0.5) -> float:
+    """Quantile of some values, (n,) float array, n > 0: by default the median. NumPy takes ten times as long."""
+    return float(np.interp(share * (len(values) - 1), np.arange(len(values)), np.sort(values)))
 
 
 class Members:
@@ -36,14 +40,18 @@ class Members:
         return np.concatenate(parts) if parts else self._order[:0]
 
 
+FEW_NUMBERS = 10000  # speed: numbers, whose sum takes less time than to make a matrix for it
+
+
 def group_sum(values: np.ndarray, group: np.ndarray, n: int, weight: np.ndarray | None = None) -> np.ndarray:
     """Sum of the rows of `values` (m, ...) in each group 0 .. n-1, (n, ...) float array.
 
     With `weight` (m, c) every row is in c groups, (m, c), with a weight in each.
     """
     flat = values.reshape(len(values), math.prod(values.shape[1:]))
-    if weight is None and flat.shape[1] < 4:
-        total = np.stack([np.bincount(group, column, n) for column in flat.T], axis=1)
+    if weight is None and flat.size < FEW_NUMBERS:
+        place = group[:, None] * flat.shape[1] + np.arange(flat.shape[1])
+        total = np.bincount(place.ravel(), flat.ravel(), n * flat.shape[1])
     else:  # one sweep over the rows: 3 to 7 times faster than one over every column
         weight = np.ones_like(group, float) if weight is None else weight
         each = np.arange(len(group) + 1) * (group.size // max(len(group), 1))

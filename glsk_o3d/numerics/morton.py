@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .vectors import TINY
+from .vectors import TINY, box
 
 MORTON_BITS = 21  # derived: per axis: 63 bits in all
 FINEST_CELLS: int = 2**MORTON_BITS - 1  # derived: cells along the longest side of the finest grid
@@ -37,8 +37,8 @@ def morton_codes(
     `cells`, at most 2^21 - 1, lie along the longest side. Another box around the points has the lowest corner `corner`
     (3,) and the longest side `extent`.
     """
-    corner = points.min(axis=0) if corner is None else corner
-    extent = max(np.ptp(points, axis=0).max() if extent is None else extent, TINY)
+    low, high = box(points)
+    corner, extent = low if corner is None else corner, max((high - low).max() if extent is None else extent, TINY)
     code = np.zeros(len(points), np.uint64)
     for axis, column in enumerate(points.T):
         cell = ((column - corner[axis]) / extent * cells).astype(np.uint64)

@@ -22,7 +22,7 @@ def linked(places: np.ndarray, ends: np.ndarray) -> csr_matrix:
     n, ends = len(places), ends[ends[:, 0] != ends[:, 1]]
     links = csr_matrix(coo_matrix((np.ones(2 * len(ends)), np.concatenate([ends, ends[:, ::-1]]).T), shape=(n, n)))
     row = np.repeat(np.arange(n), np.diff(links.indptr))
-    links.data = np.maximum(norm(places[row] - places[links.indices]), TINY)
+    links.data = np.maximum(norm(places.take(row, axis=0) - places.take(links.indices, axis=0)), TINY)
     return links
 
 

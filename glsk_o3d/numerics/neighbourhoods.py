@@ -41,6 +41,15 @@ def nearest_neighbours(points: np.ndarray, k: int, of: np.ndarray | None = None)
     return distance, neighbour
 
 
+def distances(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
+    """Distance of every point (n, 3) to each of its neighbours, (n, k) float array as of `nearest_neighbours`."""
+    squared = np.zeros(neighbours.shape)
+    for x in np.ascontiguousarray(points.T):
+        away = x.take(neighbours) - x[:, None]
+        squared += away * away
+    return np.sqrt(squared)
+
+
 def nearest_left(points: np.ndarray, neighbours: np.ndarray, left: np.ndarray, k: int) -> np.ndarray:
     """The k nearest points of every point left among those left, (m, k) positions among these, nearest first.
 
@@ -50,8 +59,7 @@ def nearest_left(points: np.ndarray, neighbours: np.ndarray, left: np.ndarray, k
     known = neighbours[rows]
     there = left.take(known)
     rank = np.cumsum(there, axis=1, dtype=np.int16)
-    enough = rank[:, -1] >= k
-    found = np.empty((len(rows), k), int)
+    enough, found = rank[:, -1] >= k, np.empty((len(rows), k), int)
     found[enough] = index[known[enough][(there & (rank <= k))[enough]]].reshape(-1, k)
     if not enough.all():
         found[~enough] = nearest_neighbours(points[rows], k, of=points[rows[~enough]])[1]
@@ -128,8 +136,8 @@ def uprightness(points: np.ndarray, normals: np.ndarray, p: np.ndarray, q: np.nd
 
     1 where a surface goes on from one point to the other, 0 where two surfaces face each other.
     """
-    line = unit(points[q] - points[p])
-    at_p, at_q = (np.maximum(1 - dot(normals[end], line) ** 2, 0) for end in (p, q))
+    line = unit(points.take(q, axis=0) - points.take(p, axis=0))
+    at_p, at_q = (np.maximum(1 - dot(normals.take(end, axis=0), line) ** 2, 0) for end in (p, q))
     return at_p * at_q
 
 

@@ -4,6 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from .vectors import dot
+
 Pairs = tuple[np.ndarray, np.ndarray]
 """Points that are kept, and for each of them the one that it swallows."""
 
@@ -42,15 +44,14 @@ def final_representatives(representative: np.ndarray) -> np.ndarray:
 def mutual_pairs(points: np.ndarray, neighbours: np.ndarray, left: np.ndarray) -> Pairs:
     """Pairs of points left that are each other's nearest; of each pair the one with more room around it is kept."""
     rows = np.flatnonzero(left)
-    candidates = neighbours[rows, 1:]
+    candidates = neighbours.take(rows, axis=0)[:, 1:]
     there = left.take(candidates)
     first = np.argmax(there, axis=1)
-    found = there[np.arange(len(rows)), first]
-    nearest = np.full(len(points), -1)
+    found, nearest = there[np.arange(len(rows)), first], np.full(len(points), -1)
     nearest[rows[found]] = candidates[found, first[found]]
     one = rows[found]
     one = one[(nearest[nearest[one]] == one) & (one < nearest[one])]
     other = nearest[one]
-    room = [((points[neighbours[p, -1]] - points[p]) ** 2).sum(axis=1) for p in (one, other)]
-    swap = room[1] > room[0]
+    ways = [points.take(neighbours[p, -1], axis=0) - points.take(p, axis=0) for p in (one, other)]
+    swap = dot(ways[1], ways[1]) > dot(ways[0], ways[0])
     return np.where(swap, other, one), np.where(swap, one, other)

@@ -13,7 +13,8 @@ def maximal_paths(n: int, edges: np.ndarray) -> list[tuple[list[int], list[int]]
     for edge, (a, b) in enumerate(edges.tolist()):
         around[a][b] = around[b][a] = edge
     degree, paths = [len(links) for links in around], []
-    for start in sorted(range(n), key=lambda v: degree[v] == 2):
+    ends = [v for v in range(n) if degree[v] != 2]
+    for start in (*ends, *range(n)):
         while around[start]:
             here, vertices, path = start, [start], list[int]()
             while here != start or not path:

@@ -7,17 +7,23 @@ import numpy as np
 from .groups import group_rank
 from .vectors import TINY, Floats, dot, norm
 
+ROUNDING = np.finfo(float).eps  # derived: of a number, over itself
 POLYLINE_CHUNK = 2**20  # speed: pairs of a point and an edge at a time: memory stays flat
 
 
 def arc_lengths(path: np.ndarray) -> np.ndarray:
     """Length along a path, (p, 3) float array, from its first place to every place, (p,) float array."""
-    return np.concatenate([[0], np.cumsum(norm(np.diff(path, axis=0)))])
+    lengths = np.zeros(len(path))
+    np.cumsum(norm(path[1:] - path[:-1]), out=lengths[1:])
+    return lengths
 
 
 def place_at(path: np.ndarray, lengths: np.ndarray, length: float | np.ndarray) -> Floats:
     """The place so far along a path, (p, 3) float array with its `arc_lengths`; (3,), or (k, 3) for k lengths."""
-    return np.stack([np.interp(length, lengths, x) for x in path.T], axis=-1)
+    places = np.empty((*np.shape(length), 3))
+    for axis in range(3):
+        places[..., axis] = np.interp(length, lengths, path[:, axis])
+    return places
 
 
 def relative_distance(
@@ -35,20 +41,19 @@ def relative_distance(
     # relative to one of them: products of coordinates far from the origin would cancel
     points, start = points - start[0], start - start[0]
     size = max(np.abs(points).max(), np.abs(start).max())
-    least = max(np.finfo(float).eps * size, TINY)  # of a line, which has no thickness but roundings
+    least = max(ROUNDING * size, TINY)  # of a line, which has no thickness but roundings
     ratio, nearest = np.empty(len(points)), np.empty(len(points))
     rows = max(POLYLINE_CHUNK // len(a), 1)
     for first in range(0, len(points), rows):
         p = points[first : first + rows]
         along = p @ direction.T - dot(start, direction)
-        squared = (p**2).sum(axis=1)[:, None] - 2 * p @ start.T + (start**2).sum(axis=1)
+        squared = dot(p, p)[:, None] - 2 * p @ start.T + dot(start, start)
         foot = np.clip(along, 0, length)
         distance = np.sqrt(np.maximum(squared + foot * (foot - 2 * along), 0))
         there = np.maximum(surface[a] + foot / np.maximum(length, TINY) * (surface[b] - surface[a]), least)
         over = distance / there
-        edge = over.argmin(axis=1)[:, None]
-        ratio[first : first + rows] = np.take_along_axis(over, edge, axis=1)[:, 0]
-        nearest[first : first + rows] = np.take_along_axis(there, edge, axis=1)[:, 0]
+        edge, every = over.argmin(axis=1), np.arange(len(p))
+        ratio[first : first + rows], nearest[first : first + rows] = over[every, edge], there[every, edge]
     return ratio, nearest
 
 
@@ -72,17 +77,24 @@ def nearest_on_edges(
     `candidates` (n, c) are at least one edge for each point, padded with -1. Returns the edges (n,), and t (n,) from 0
     at the first end of the edge to 1 at the second.
     """
-    starts, ways = x[edges[:, 0]], x[edges[:, 1]] - x[edges[:, 0]]
-    lengths = np.maximum(dot(ways, ways), TINY)  # squared
     edge, t, best = np.zeros(len(p), int), np.zeros(len(p)), np.full(len(p), np.inf)
+    starts, p = x.T.take(edges[:, 0], axis=1), np.ascontiguousarray(p.T)  # along the memory
+    ways = x.T.take(edges[:, 1], axis=1) - starts
+    lengths = np.maximum((ways * ways).sum(axis=0), TINY)  # squared
     for column in candidates.T:
         some = np.flatnonzero(column >= 0)
         column = column[some]
-        along, offset = ways.take(column, axis=0), p.take(some, axis=0) - starts.take(column, axis=0)
-        part = np.clip(dot(along, offset) / lengths.take(column), 0, 1)
-        offset -= part[:, None] * along
-        squared = dot(offset, offset)
+        along, offset = ways.take(column, axis=1), p.take(some, axis=1) - starts.take(column, axis=1)
+        part = np.clip((along * offset).sum(axis=0) / lengths.take(column), 0, 1)
+        offset -= part * along
+        squared = (offset * offset).sum(axis=0)
         nearer = squared < (1 - NEAREST_TIE) * best[some]  # a vertex belongs to all its edges: rounding must not choose
         some = some[nearer]
         edge[some], t[some], best[some] = column[nearer], part[nearer], squared[nearer]
     return edge, t
+
+
+def places_on_edges(x: np.ndarray, edges: np.ndarray, edge: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """The places, (n, 3) float array, that `nearest_on_edges` names."""
+    start, way = x[edges[:, 0]], x[edges[:, 1]] - x[edges[:, 0]]
+    return start.take(edge, axis=0) + t[:, None] * way.take(edge, axis=0)

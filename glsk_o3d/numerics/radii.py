@@ -3,14 +3,14 @@
 import numpy as np
 
 from .groups import group_median, group_sum
-from .vectors import COLUMNS, ROWS, Floats, dot
+from .vectors import COLUMNS, ROWS, Floats, dot, finite_rows
 
 TIMES = np.where(ROWS == COLUMNS, 1, 2)  # that an entry stands in a symmetric matrix
 
 
 def supporting_points(vertex_of_point: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Points that have a vertex and a normal, int array."""
-    return np.flatnonzero((vertex_of_point >= 0) & np.isfinite(np.einsum("ni->n", normals)))
+    return np.flatnonzero((vertex_of_point >= 0) & finite_rows(normals))
 
 
 def plane_distance_radii(

@@ -64,7 +64,7 @@ class Rings:
         """Distance from every point to each of its ring neighbours, (m,) float array."""
         squared = np.zeros(len(self.indices))
         for x in points.T:
-            edge = x.take(self.indices) - x.repeat(self.sizes)
+            edge = x.take(self.indices) - x.take(self.centres)
             squared += edge * edge
         return np.sqrt(squared)
 
@@ -105,8 +105,7 @@ class Rings:
 
     def replace(self, points: np.ndarray, rings: Rings) -> Rings:
         """These rings with those of `points` replaced by `rings`."""
-        both = Rings.concatenate([self, rings])
-        source = np.arange(len(self))
+        both, source = Rings.concatenate([self, rings]), np.arange(len(self))
         source[points] = len(self) + np.arange(len(rings))
         return both.take(source)
 

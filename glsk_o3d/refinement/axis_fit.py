@@ -11,12 +11,13 @@ from scipy.sparse import bsr_array, csc_array
 
 from ..numerics.groups import group_sum
 from ..numerics.neighbourhoods import nearest_neighbours
-from ..numerics.polylines import incident_edges, nearest_on_edges
+from ..numerics.polylines import incident_edges, nearest_on_edges, places_on_edges
 from ..numerics.radii import plane_distance_radii, robust_radii
 from ..numerics.solver import factorised
-from ..numerics.vectors import COLUMNS, FULL, ROWS, TINY, Floats, dot, norm, unit
+from ..numerics.vectors import COLUMNS, FULL, ROWS, TINY, Floats, box, cross, dot, norm, unit
 from ..skeleton import NOT_MEASURED, Skeleton
 from .evidence import SurfaceGraph
+from .merging import with_fields
 from .sections import Sections, VertexPoints, half_axes, measure_sections, normal_moments
 
 FIT_STIFFNESS = 1.0  # fitted: length over which the curve hardly bends, over the half axis of its section there
@@ -44,10 +45,9 @@ def pull_back_detached(skeleton: Skeleton) -> Skeleton:
     count = np.maximum(cloud.count, 1)
     mean = group_sum(cloud.offset, cloud.vertex, m) / count[:, None]
     spread = group_sum((cloud.points - (skeleton.vertices + mean)[cloud.vertex]) ** 2, cloud.vertex, m).sum(axis=1)
-    reach = HALF_TUBE_REACH * np.sqrt(spread / count)
-    away = norm(mean)
+    reach, away = HALF_TUBE_REACH * np.sqrt(spread / count), norm(mean)
     back = 1 - np.minimum(reach, away) / np.maximum(away, TINY)
-    return replace(skeleton, vertices=skeleton.vertices + back[:, None] * mean)
+    return with_fields(skeleton, vertices=skeleton.vertices + back[:, None] * mean)
 
 
 def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = None, settle: bool = False) -> Skeleton:
@@ -79,41 +79,52 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
     the vertex nearest to their place.
     """
     m, ends = len(skeleton.vertices), skeleton.edges
-    points = skeleton.supporting_points
-    points = points[skeleton.degree[skeleton.vertex_of_point[points]] > 0]
+    points, owner = skeleton.supporting_points, skeleton.vertex_of_point.copy()
+    points = points[skeleton.degree[owner[points]] > 0]
     if len(points) == 0:
-        return replace(skeleton, confidence=np.zeros(m), radii=_plane_radii(skeleton, skeleton.vertices))
+        radii = plane_distance_radii(skeleton.vertices, owner, skeleton.points, skeleton.normals, skeleton.radii)
+        return with_fields(skeleton, confidence=np.zeros(m), radii=radii)
     centre = skeleton.vertices.mean(axis=0)
     x, p, n = skeleton.vertices - centre, skeleton.points[points] - centre, skeleton.normals.take(points, axis=0)
-    vertex, edges_at = skeleton.vertex_of_point[points], incident_edges(ends, m)
+    vertex, edges_at = owner[points], incident_edges(ends, m)
     pattern = _Pattern(skeleton, edges_at)
     low, high = axis_box(p)
-    near = _nearest(x, ends, edges_at[vertex], p, n, p, skeleton.radii)
+    near = _nearest(x, ends, *nearest_on_edges(x, ends, edges_at[vertex], p), p, n, skeleton.radii)
     if passes:
         smooth = _smoother(surface or SurfaceGraph.of(skeleton), points, p)
-    for _ in range(passes):
-        edge, t = nearest_on_edges(x, ends, edges_at[vertex], p)
-        place = x[ends[edge, 0]] + t[:, None] * (x[ends[edge, 1]] - x[ends[edge, 0]])
-        place = smooth(place, FIT_DIFFUSION * near.width[vertex])
-        for _ in range(FIT_WALK):
-            edge, t = nearest_on_edges(x, ends, edges_at[vertex], place)
-            vertex = ends[edge, (t > 0.5).astype(int)]
-        near = _nearest(x, ends, edges_at[vertex], p, n, place, skeleton.radii)
+    for again in range(passes):
+        onto = nearest_on_edges(x, ends, edges_at[vertex], p) if again else (near.edge, near.share[:, 1])
+        place = smooth(places_on_edges(x, ends, *onto), FIT_DIFFUSION * near.width[vertex])
+        vertex, edge, t = _walked(x, ends, edges_at, vertex, place)
+        near = _nearest(x, ends, edge, t, p, n, skeleton.radii)
         pull = _pull(near) if settle else np.zeros((m, 3, 3))
         x = _solve(x, near, p, pull[ends].mean(axis=1), pattern)
         # normals that mean nothing may meet anywhere
         x = np.where(skeleton.degree[:, None] > 0, np.clip(x, low, high), x)
     if passes:
-        near = _nearest(x, ends, edges_at[vertex], p, n, place, skeleton.radii)
-        owner = skeleton.vertex_of_point.copy()
+        near = _nearest(x, ends, *nearest_on_edges(x, ends, edges_at[vertex], place), p, n, skeleton.radii)
         owner[points] = vertex
-        skeleton = replace(skeleton, vertex_of_point=owner)
-    radii = _plane_radii(skeleton, x + centre)
+    radii = plane_distance_radii(x + centre, owner, skeleton.points, skeleton.normals, skeleton.radii)
     if passes:  # the distance from a curve that nobody has centred is no radius
         equal = np.where(near.support > 0, near.sections.radius, radii)
         radii = robust_radii(equal, norm(near.offset), near.doubt, n, vertex)
     confidence = (1 - near.doubt) * near.support / (near.support + HALF_SUPPORT)
-    return replace(skeleton, vertices=x + centre, confidence=confidence, radii=radii)
+    return with_fields(skeleton, vertices=x + centre, confidence=confidence, radii=radii, vertex_of_point=owner)
+
+
+def _walked(
+    x: np.ndarray, ends: np.ndarray, edges_at: np.ndarray, vertex: np.ndarray, place: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The vertex near each place, a few steps from the one it had; and the nearest edge there, and where on it."""
+    vertex, going = vertex.copy(), np.arange(len(place))
+    edge, t = nearest_on_edges(x, ends, edges_at[vertex], place)
+    for _ in range(FIT_WALK):  # only what got to another vertex is asked again
+        ahead = ends[edge[going], (t[going] > 0.5).astype(int)]
+        on = ahead != vertex[going]
+        going = going[on]
+        vertex[going] = ahead[on]
+        edge[going], t[going] = nearest_on_edges(x, ends, edges_at[vertex[going]], place[going])
+    return vertex, edge, t
 
 
 def _smoother(
@@ -140,13 +151,9 @@ def _smoother(
     return smooth
 
 
-def _plane_radii(skeleton: Skeleton, vertices: np.ndarray) -> np.ndarray:
-    return plane_distance_radii(vertices, skeleton.vertex_of_point, skeleton.points, skeleton.normals, skeleton.radii)
-
-
 def axis_box(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest coordinates, (3,), that an axis of points, (n, 3) float array, n > 0, may have."""
-    low, high = points.min(axis=0), points.max(axis=0)
+    low, high = box(points)
     slack = FIT_BEYOND * np.linalg.norm(high - low)
     return low - slack, high + slack
 
@@ -167,24 +174,13 @@ class _Nearest(NamedTuple):
 
 
 def _nearest(
-    x: np.ndarray,
-    ends: np.ndarray,
-    around: np.ndarray,
-    p: np.ndarray,
-    n: np.ndarray,
-    place: np.ndarray,
-    radii: np.ndarray,
+    x: np.ndarray, ends: np.ndarray, edge: np.ndarray, t: np.ndarray, p: np.ndarray, n: np.ndarray, radii: np.ndarray
 ) -> _Nearest:
-    """Of every point the place of the curve nearest to `place`; the radii are half axes in directions nobody saw."""
-    edge, t = nearest_on_edges(x, ends, around, place)
-    share = np.column_stack([1 - t, t])
-    start, way = x[ends[:, 0]], x[ends[:, 1]] - x[ends[:, 0]]
-    tangent = unit(way)
+    """What every point is to a place of the curve; the radii are half axes in directions nobody saw."""
+    share, tangent = np.column_stack([1 - t, t]), unit(x[ends[:, 1]] - x[ends[:, 0]])
     along = tangent.take(edge, axis=0)
-    across = np.cross(n, along)
-    offset = start.take(edge, axis=0) + t[:, None] * way.take(edge, axis=0) - p
-    miss = dot(across, offset) ** 2
-    apart = dot(offset, offset) - dot(offset, along) ** 2
+    across, offset = cross(n, along), places_on_edges(x, ends, edge, t) - p
+    miss, apart = dot(across, offset) ** 2, dot(offset, offset) - dot(offset, along) ** 2
     a, b = ends.T
     aside = offset - dot(offset, along)[:, None] * along
     squares = aside[:, ROWS] * aside[:, COLUMNS]
@@ -291,22 +287,20 @@ def subdivide_edges(skeleton: Skeleton, spacing: float) -> Skeleton:
 
     No edge is longer than `spacing` times the mean radius of its ends, but where points are few: a piece for 8.
     """
-    ends = skeleton.edges
-    m = len(skeleton.vertices)
-    radii = measure_sections(skeleton).radius
-    length = np.maximum(spacing * radii[ends].mean(axis=1), np.maximum(1e-3 * skeleton.edge_lengths, TINY))
+    ends, m = skeleton.edges, len(skeleton.vertices)
+    half = measure_sections(skeleton).radius[ends].mean(axis=1)
+    length = np.maximum(spacing * half, np.maximum(1e-3 * skeleton.edge_lengths, TINY))
     points = (VertexPoints(skeleton).mass / np.maximum(skeleton.degree, 1))[ends].sum(axis=1)
     most = np.maximum(points / POINTS_PER_PIECE, 1)
     pieces = np.ceil(np.clip(skeleton.edge_lengths / length, 1, most)).astype(int)  # also edges of no length are one
     inner = pieces - 1
     edge = np.repeat(np.arange(len(ends)), inner)
     step = np.arange(len(edge)) - np.repeat(np.cumsum(inner) - inner, inner) + 1
-    t = (step / pieces[edge])[:, None]
-    a, b = skeleton.vertices[ends[edge, 0]], skeleton.vertices[ends[edge, 1]]
-    vertices = np.concatenate([skeleton.vertices, (1 - t) * a + t * b])
+    share = np.column_stack([1 - step / pieces[edge], step / pieces[edge]])
+    vertices = np.concatenate([skeleton.vertices, (share[:, :, None] * skeleton.vertices[ends[edge]]).sum(axis=1)])
+    radii = np.concatenate([skeleton.radii, (share * skeleton.radii[ends[edge]]).sum(axis=1)])
 
-    first = m + np.cumsum(inner) - inner
-    chain = np.repeat(np.arange(len(ends)), pieces)
+    first, chain = m + np.cumsum(inner) - inner, np.repeat(np.arange(len(ends)), pieces)
     k = np.arange(len(chain)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
     start = np.where(k == 0, ends[chain, 0], first[chain] + k - 1)
     stop = np.where(k == inner[chain], ends[chain, 1], first[chain] + k)
@@ -331,8 +325,5 @@ def subdivide_edges(skeleton: Skeleton, spacing: float) -> Skeleton:
             nearer = distance < best[some]
             choice[some[nearer]], best[some[nearer]] = sample[nearer], distance[nearer]
         vertex_of_point[part] = choice
-    radii = np.concatenate(
-        [skeleton.radii, ((1 - t[:, 0]) * skeleton.radii[ends[edge, 0]] + t[:, 0] * skeleton.radii[ends[edge, 1]])]
-    )
     made = dict(vertices=vertices, edges=edges, radii=radii, vertex_of_point=vertex_of_point)
     return replace(skeleton, **NOT_MEASURED | made)

@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..numerics.groups import Members
+from ..numerics.groups import Members, quantile
+from ..numerics.neighbourhoods import plane_axes
 from ..numerics.polylines import arc_lengths, place_at
-from ..numerics.vectors import TINY, Floats, dot, norm, unit
+from ..numerics.vectors import TINY, Floats, cross, dot, norm, unit
 from ..skeleton import NOT_MEASURED, Skeleton
 from .axis_fit import axis_box
 from .sections import Sections, VertexPoints, measure_sections
@@ -104,7 +105,7 @@ def _grow(cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int,
         own = cloud.members.of(path[max(np.searchsorted(along, start), 0 if other else 1) :])
         if len(own) < END_POINTS:
             return None
-        reach = np.quantile((cloud.points[own] - anchor) @ way, END_REACH)
+        reach = quantile((cloud.points[own] - anchor) @ way, END_REACH)
         close = ((places - anchor) @ way > reach - END_CUT * wide) | late
         close = np.flatnonzero(close & (along > start))
         cut = max(close[0] if len(close) else len(path), first)
@@ -200,7 +201,7 @@ class _End(NamedTuple):
         Where its last points are much nearer to the axis than it is thick, as on the neck of a bottle, it has the cap
         of that thinner limb.
         """
-        reach = float(np.quantile(self.length, END_REACH))
+        reach = quantile(self.length, END_REACH)
         thin = self._thinner(taper.at(reach - taper.radius), reach)
         return self._cap(taper if np.isinf(thin) else _Taper(thin, 0.0), reach), thin
 
@@ -260,12 +261,11 @@ def _turn_and_bend(
     points: np.ndarray, normals: np.ndarray, way: np.ndarray, bend: np.ndarray, radius: float
 ) -> np.ndarray:
     """How a limb from the origin in a direction turns aside there, and how it bends, (2, 3) float array."""
-    length, across = points @ way, np.cross(normals, way)
-    powers = np.stack([length, length**2 / 2], axis=1)
-    miss = dot(across, points)
+    length, across = points @ way, cross(normals, way)
+    powers, miss = np.stack([length, length**2 / 2], axis=1), dot(across, points)
     left = miss - powers[:, 1] * (across @ bend)
-    weight = (length <= np.quantile(length, END_REACH)) * radius**2 / (radius**2 + 4 * left**2 + TINY)
-    frame: Floats = np.linalg.svd(way[None])[2][1:]
+    weight = (length <= quantile(length, END_REACH)) * radius**2 / (radius**2 + 4 * left**2 + TINY)
+    frame: Floats = plane_axes(way[None])[0].T
     ask = (powers[:, :, None] * (across @ frame.T)[:, None]).reshape(-1, 4)
     stiff = END_BENDING / 2 * (weight @ powers**2).repeat(2)
     found: Floats = np.linalg.solve((weight[:, None] * ask).T @ ask + np.diag(stiff + TINY), (weight * miss) @ ask)

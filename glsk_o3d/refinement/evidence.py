@@ -14,10 +14,11 @@ from ..numerics.diffusion import Diffusion
 from ..numerics.groups import group_rank
 from ..numerics.morton import morton_order
 from ..numerics.neighbourhoods import nearest_neighbours, uprightness
-from ..numerics.polylines import incident_edges, nearest_on_edges
-from ..numerics.vectors import TINY, dot
+from ..numerics.polylines import incident_edges, nearest_on_edges, places_on_edges
+from ..numerics.vectors import TINY, dot, finite_rows
 from ..numerics.winding import AREA_NEIGHBOURS, orient_from_axis, point_areas, winding_number
 from ..skeleton import Skeleton
+from .merging import with_fields
 
 # fitted: winding number below which an axis is in nothing; .5 on that of a tube seen from one side, .2 in sparse crowns
 LEAST_INSIDE = 0.4
@@ -48,7 +49,7 @@ class SurfaceGraph:
         step = max(len(supporting) // enough, 1)
         if step > 1:  # which they are must not depend on points that have no say
             supporting = np.sort(supporting[morton_order(skeleton.points[supporting])[::step]])
-        supporting = supporting[_first_in_their_place(skeleton.points[supporting])]
+        supporting = supporting[first_in_their_place(skeleton.points[supporting])]
         points = skeleton.points[supporting]
         if not len(points):
             return cls(supporting, points, np.empty((0, 1), int))
@@ -74,10 +75,11 @@ class Evidence(SurfaceGraph):
         surface = surface or SurfaceGraph.of(skeleton)
         supporting, points, neighbours = surface.supporting, surface.points, surface.neighbours
         edge, t = _nearest_edges(skeleton, supporting)
-        start, stop = skeleton.vertices[skeleton.edges[edge]].transpose(1, 0, 2)
-        axis = np.where(edge[:, None] >= 0, start + t[:, None] * (stop - start), points)
+        axis = np.where(edge[:, None] >= 0, places_on_edges(skeleton.vertices, skeleton.edges, edge, t), points)
         normals = orient_from_axis(points, skeleton.normals[supporting], axis, neighbours)
-        return cls(supporting, points, neighbours, normals, point_areas(points, neighbours))
+        made = cls(supporting, points, neighbours, normals, point_areas(points, neighbours))
+        vars(made)["diffusion"] = surface.diffusion  # over the same links
+        return made
 
     def winding(self, queries: np.ndarray) -> np.ndarray:
         """Winding number of the surface around each place, (m,) float array from (m, 3): near 1 inside, 0 outside."""
@@ -119,10 +121,12 @@ class Evidence(SurfaceGraph):
     def _bonds(self, skeleton: Skeleton) -> tuple[np.ndarray, np.ndarray]:
         vertex, m = skeleton.vertex_of_point[self.supporting], len(skeleton.vertices)
         p, q = np.repeat(np.arange(len(vertex)), self.neighbours.shape[1] - 1), self.neighbours[:, 1:].ravel()
-        foreign = vertex[p] != vertex[q]
-        p, q = p[foreign], q[foreign]
-        weight = dot(self.normals[p], self.normals[q]) ** 2 * uprightness(self.points, self.normals, p, q)
-        keys = np.minimum(vertex[p], vertex[q]) * m + np.maximum(vertex[p], vertex[q])
+        a, b = vertex[p], vertex[q]
+        foreign = np.flatnonzero(a != b)
+        p, q, a, b = (each.take(foreign) for each in (p, q, a, b))
+        agree = dot(self.normals.take(p, axis=0), self.normals.take(q, axis=0)) ** 2
+        weight = agree * uprightness(self.points, self.normals, p, q)
+        keys = np.minimum(a, b) * m + np.maximum(a, b)
         keys, which = np.unique(keys, return_inverse=True)
         return np.column_stack(np.divmod(keys, m)), np.bincount(which, weight, len(keys))
 
@@ -146,6 +150,7 @@ def on_sample(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skele
     points, vertex = skeleton.points[rows], skeleton.vertex_of_point[rows]
     made = step(replace(skeleton, points=points, normals=skeleton.normals[rows], vertex_of_point=vertex))
     owned = np.flatnonzero(skeleton.vertex_of_point >= 0)
+    owned = owned[morton_order(skeleton.points[owned])]  # the tree is quicker with what is near in turn
     owner = np.full(len(skeleton.points), -1)
     owner[owned] = made.vertex_of_point[cKDTree(points).query(skeleton.points[owned])[1]]
     return replace(made, points=skeleton.points, normals=skeleton.normals, vertex_of_point=owner)
@@ -157,7 +162,7 @@ def in_order(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skelet
     That would show in the last digit of sums, and where one thing is as good as another, as on grids, it decides. In
     the result the points are as they came.
     """
-    finite = np.isfinite(skeleton.points).all(axis=1)
+    finite = finite_rows(skeleton.points)
     some = np.flatnonzero(finite)
     if len(some):
         some = some[morton_order(skeleton.points[some])]
@@ -165,9 +170,9 @@ def in_order(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skelet
     back = np.empty_like(order)
     back[order] = np.arange(len(order))
     vertex, normals = skeleton.vertex_of_point[order], skeleton.normals.take(order, axis=0)
-    made = step(replace(skeleton, points=skeleton.points[order], normals=normals, vertex_of_point=vertex))
+    made = step(with_fields(skeleton, points=skeleton.points[order], normals=normals, vertex_of_point=vertex))
     vertex, normals = made.vertex_of_point[back], made.normals.take(back, axis=0)
-    return replace(made, points=skeleton.points, normals=normals, vertex_of_point=vertex)
+    return with_fields(made, points=skeleton.points, normals=normals, vertex_of_point=vertex)
 
 
 def _nearest_edges(skeleton: Skeleton, supporting: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -178,10 +183,11 @@ def _nearest_edges(skeleton: Skeleton, supporting: np.ndarray) -> tuple[np.ndarr
     return np.where(skeleton.degree[vertex] > 0, edge, -1), t
 
 
-def _first_in_their_place(points: np.ndarray) -> np.ndarray:
+def first_in_their_place(points: np.ndarray) -> np.ndarray:
     """The first of all points with the same coordinates, bool array: which of them is linked would be chance."""
+    if np.diff(np.sort(points[:, 0])).all():  # mostly, and then they need not be sorted by three coordinates
+        return np.ones(len(points), bool)
     order = np.lexsort(points.T)
-    again = (np.diff(points[order], axis=0) == 0).all(axis=1)
-    first = np.ones(len(points), bool)
+    again, first = (np.diff(points[order], axis=0) == 0).all(axis=1), np.ones(len(points), bool)
     first[order[1:][again]] = False
     return first

@@ -11,7 +11,7 @@ from ..numerics.vectors import TINY, dot
 from ..skeleton import Skeleton
 from .axis_fit import axis_box
 from .limbs import AXIS_LEAVES, AXIS_LENGTH, Limbs
-from .merging import merge_into
+from .merging import merge_into, with_fields
 from .sections import VertexPoints
 
 # All fitted, but for the steps.
@@ -133,7 +133,7 @@ def _straightened(skeleton: Skeleton, limbs: Limbs, places: dict[int, _Place]) -
             radius = np.interp(start, along, skeleton.radii[path])
             radii[path[moved]] = radius
             radii[junction] = max(radii[junction], radius)
-    return replace(skeleton, vertices=vertices, radii=radii)
+    return with_fields(skeleton, vertices=vertices, radii=radii)
 
 
 def limb_line(
@@ -152,8 +152,7 @@ def limb_line(
     n = max(int(np.ceil(along[-1] / step)), 8)
     step, half = along[-1] / n, n // 2
     at = (np.arange(n) + 0.5) * step
-    curve = place_at(places, along, at)
-    clear = np.ones(n)
+    curve, clear = place_at(places, along, at), np.ones(n)
     if others:
         left, _ = relative_distance(curve, vertices, surface, others)
         clear = np.clip((left - 1) / (2 * (AXIS_LEAVES - 1)), 0, 1)
@@ -190,29 +189,32 @@ def meet(
     surface without such a sphere has no say. The junction was `near`, and `radius` is that of the thickest limb there.
     """
     place, touching, radius = near, radius, max(radius, TINY)
+    known = [line for line in lines if line.spread > 0 and line.radius > 0]
+    middle, way = (np.array([line[k] for line in known]).reshape(-1, 3) for k in range(2))
+    spread, noise = np.array([(line.spread, line.bend / line.radius + LINE_NOISE) for line in known]).reshape(-1, 2).T
+    across = np.eye(3) - way[:, :, None] * way[:, None]
     for _ in range(MEETING_ROUNDS):
         matrix, right = np.diag([MEETING_HOLD] * 3 + [1e-6]), np.zeros(4)
         right[:3] = MEETING_HOLD * (near - place)
         right[3] = 1e-6 * touching
-        for line in lines:
-            if line.spread <= 0 or line.radius <= 0:
-                continue
-            offset = line.middle - place
-            aside = offset - (offset @ line.way) * line.way
-            error = (line.bend / line.radius + LINE_NOISE) * (1 + (offset @ line.way / line.spread) ** 2)
-            weight = 1 / ((1 + error**2) * (1 + aside @ aside / radius**2))
-            matrix[:3, :3] += weight * (np.eye(3) - np.outer(line.way, line.way))
-            right[:3] += weight * aside
+        offset = middle - place
+        ahead = dot(offset, way)
+        aside, error = offset - ahead[:, None] * way, noise * (1 + (ahead / spread) ** 2)
+        weight = 1 / ((1 + error**2) * (1 + dot(aside, aside) / radius**2))
+        matrix[:3, :3] += (weight[:, None, None] * across).sum(axis=0)
+        right[:3] += weight @ aside
         if len(points):
             offset = points - place
-            window = np.exp(-dot(offset, offset) / (2 * radius**2))
-            height = dot(offset, normals)
-            fits = window / (1 + ((np.abs(height) - touching) / (SURFACE_FIT * radius)) ** 2)
+            window, height = np.exp(-dot(offset, offset) / (2 * radius**2)), dot(offset, normals)
+            high = np.abs(height)
+            fits = window / (1 + ((high - touching) / (SURFACE_FIT * radius)) ** 2)
             fits *= SURFACE_WEIGHT / max(window.sum(), TINY)
-            plane = np.column_stack([np.where(height < 0, -1, 1)[:, None] * normals, np.ones(len(points))])
-            matrix += (fits[:, None] * plane).T @ plane
-            right += plane.T @ (fits * np.abs(height))
+            # of n with the sign of its height, and 1
+            matrix[:3, :3] += (fits[:, None] * normals).T @ normals
+            matrix[3, :3] = matrix[:3, 3] = np.copysign(fits, height) @ normals
+            matrix[3, 3] += fits.sum()
+            right += [*((fits * height) @ normals), fits @ high]
         *step, touching = np.linalg.solve(matrix, right)
-        touching = float(np.clip(touching, 0, 2 * radius))
+        touching = min(max(touching, 0.0), 2 * radius)
         place = place + step
     return place, touching

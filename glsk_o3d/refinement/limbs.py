@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 
-from ..numerics.groups import component_labels
+from ..numerics.groups import component_labels, quantile
 from ..numerics.polylines import arc_lengths, place_at, relative_distance
 from ..numerics.vectors import TINY, dot, norm
 from ..skeleton import Skeleton
@@ -34,7 +34,7 @@ class Limbs:
         self.surface = np.where(surface > 0, surface, skeleton.radii)
         self.branches = skeleton.branches
         ends = np.array([branch[[0, -1]] for branch in self.branches], int).reshape(-1, 2)
-        self.radius = np.array([np.median(self.surface[branch]) for branch in self.branches], float)
+        self.radius = np.array([quantile(self.surface[branch]) for branch in self.branches], float)
         self.inner = (degree[ends] > 2).all(axis=1) & (ends[:, 0] != ends[:, 1])
         length = np.array([arc_lengths(self.vertices[branch])[-1] for branch in self.branches], float)
         self.short = joined & (length < AXIS_SHORT * self.radius * np.where(self.inner, 2, 1))

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from ..numerics.groups import group_sum
 from ..numerics.pairing import final_representatives
-from ..skeleton import OF_VERTICES, Skeleton
+from ..skeleton import ARRAYS, OF_VERTICES, Skeleton
 from .sections import VertexPoints
 
 
@@ -70,6 +70,14 @@ def drop_lone_vertices(skeleton: Skeleton) -> Skeleton:
     )
 
 
+def with_fields(skeleton: Skeleton, **fields: Any) -> Skeleton:
+    """The same graph with other fields than its edges, as by `replace`, but unchecked, and what is known of it kept."""
+    made, known = object.__new__(Skeleton), vars(skeleton)
+    names = (*ARRAYS, "report", "degree", "component_of_vertex", "branches")
+    vars(made).update({name: known[name] for name in names if name in known} | fields)
+    return made
+
+
 def binary_size(skeleton: Skeleton) -> float:
     """The power of two next to the extent of a skeleton, so that scaling by it rounds nothing; 1 if it has none."""
     extent = np.ptp(skeleton.vertices, axis=0).max(initial=0)
@@ -79,7 +87,7 @@ def binary_size(skeleton: Skeleton) -> float:
 def scaled(skeleton: Skeleton, factor: float) -> Skeleton:
     """The same in another unit of length: vertices, radii and points."""
     vertices, points, radii = (factor * values for values in (skeleton.vertices, skeleton.points, skeleton.radii))
-    return replace(skeleton, vertices=vertices, points=points, radii=radii)
+    return with_fields(skeleton, vertices=vertices, points=points, radii=radii)
 
 
 def collapse_triangles(skeleton: Skeleton, by_degree: bool = False) -> Skeleton:

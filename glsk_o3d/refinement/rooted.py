@@ -57,8 +57,7 @@ def numbered_from(skeleton: Skeleton, root: int) -> Skeleton:
     starts = nearest[np.sort(np.unique(part[nearest], return_index=True)[1])].tolist()
     starts[0] = root  # of several vertices in one place
     order = np.concatenate([breadth_first_order(links, at, False, return_predecessors=False) for at in starts])
-    index = np.argsort(order)
-    vertex = skeleton.vertex_of_point
+    index, vertex = np.argsort(order), skeleton.vertex_of_point
     return replace(
         skeleton,
         **some_vertices(skeleton, order),

@@ -121,7 +121,7 @@ def half_axes(moments: np.ndarray, otherwise: np.ndarray) -> Sections:
     # in units in which N is 1 the extremes of h are eigenvalues
     plane = axes[:, :, 1:] / np.sqrt(np.where(known, share[:, 1:], 1))[:, None]
     reach = known[:, :, None] * known[:, None] * np.einsum("mik,mij,mjl->mkl", plane, moments[:, 6:][:, FULL], plane)
-    unseen = np.where(known, 0, np.nan_to_num(otherwise)[:, None])
+    unseen = np.where(known | np.isnan(otherwise)[:, None], 0, otherwise[:, None])
     half, turn = np.linalg.eigh(reach + unseen[:, None] * np.eye(2))
     half = np.maximum(half, 0)  # rounding may leave less than nothing
     across = unit(np.einsum("mik,mk->mi", plane, turn[:, :, 1]))

@@ -2,19 +2,19 @@
 
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ..decisions import QUESTIONS, Decision
+from ..numerics.groups import quantile
 from ..numerics.neighbourhoods import plane_axes
 from ..numerics.polylines import arc_lengths, place_at, relative_distance
-from ..numerics.vectors import TINY, norm, unit
+from ..numerics.vectors import TINY, cross, norm, unit
 from ..skeleton import Skeleton
 from .evidence import Evidence
 from .limbs import Limbs
-from .merging import merge_into
+from .merging import merge_into, with_fields
 from .sections import VertexPoints, measure_sections
 
 SPUR_POINTS = 128  # speed: of a branch that are enough to say how far it reaches
@@ -52,14 +52,14 @@ def prune_spurs(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
             for twig in worst.values() or found
         ]
         if not worst:
-            return replace(skeleton, normals=given.normals), decisions
+            return with_fields(skeleton, normals=given.normals), decisions
         group = np.arange(len(skeleton.vertices))
         for twig in worst.values():
             group[twig.body] = twig.junction
         # points of a cut branch are farther from its junction than the surface there is: they have no say any more
         gone = np.isin(skeleton.vertex_of_point, np.concatenate([twig.body for twig in worst.values()]))
         normals = np.where(gone[:, None], np.nan, skeleton.normals)
-        skeleton = merge_into(replace(skeleton, normals=normals), group)
+        skeleton = merge_into(with_fields(skeleton, normals=normals), group)
 
 
 def limb_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[int, dict[str, float]]]:
@@ -153,11 +153,11 @@ def _beside(
     places = np.array(found)
     # the first direction is the section's, so that the others turn with the object
     tangent = unit((places[:, 2:] - places[:, :-2]).reshape(-1, 3))
-    second = np.cross(tangent, width[np.concatenate(near)])
+    second = cross(tangent, width[np.concatenate(near)])
     # the width of a vertex without points is any direction, also along the branch
     second = unit(np.where(norm(second)[:, None] > 1e-6, second, plane_axes(tangent)[:, :, 0]))
     turn = np.linspace(0, 2 * np.pi, ACROSS, endpoint=False)[:, None, None]
-    across = np.cos(turn) * np.cross(second, tangent) + np.sin(turn) * second
+    across = np.cos(turn) * cross(second, tangent) + np.sin(turn) * second
     away = BESIDE * half[:, None, None] * across.reshape(ACROSS, len(paths), -1, 3)
     beside = places[:, 1:-1] + away
     winding = evidence.winding(beside.reshape(-1, 3)).reshape(beside.shape[:-1])
@@ -179,4 +179,4 @@ def _standing_out(limbs: Limbs, k: int, junction: int, points: np.ndarray, endin
     more = len(limbs.vertices) + np.arange(2 * len(longer)).reshape(2, -1).T
     paths = [*(limbs.paths[i] for i in beside), *more]
     ratio, there = relative_distance(points, vertices, np.r_[surface, radius, radius], paths)
-    return float(np.quantile((ratio - 1) * there, SPUR_QUANTILE))
+    return quantile((ratio - 1) * there, SPUR_QUANTILE)

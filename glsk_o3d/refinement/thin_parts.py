@@ -13,6 +13,7 @@ from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.vectors import COLUMNS, ROWS, TINY
 from ..skeleton import Skeleton
 from .diagnostics import SHEET_SHARE
+from .evidence import first_in_their_place
 from .sections import VertexPoints
 
 SCALE_NEIGHBOUR = 8  # fitted: the nearest point whose distance is the scale of a point
@@ -41,8 +42,7 @@ class SpacedPoints(VertexPoints):
         if len(some):
             some = some[sample_cloud(points[some], TRACED_POINTS)[0]]
         wide = np.ptp(points[some], axis=0).max() if len(some) else 0.0
-        cells = np.rint(points[some] / max(SAME_PLACE * wide, TINY))
-        return some[np.sort(np.unique(cells, axis=0, return_index=True)[1])]
+        return some[first_in_their_place(np.rint(points[some] / max(SAME_PLACE * wide, TINY)))]
 
     @cached_property
     def links(self) -> csr_matrix:

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from ..numerics.groups import component_labels, group_median
 from ..numerics.near_links import join_pieces, linked, slice_centres, steps
-from ..numerics.polylines import incident_edges, nearest_on_edges
+from ..numerics.polylines import incident_edges, nearest_on_edges, places_on_edges
 from ..numerics.vectors import dot, norm, unit
 from ..skeleton import NOT_MEASURED, Skeleton
 from .merging import merge_into
@@ -194,8 +194,7 @@ def _assembled(skeleton: Skeleton, mixed: _Mixed, paths: _Paths, tree: bool) -> 
 
 def _meetings(vertices: np.ndarray, edges: np.ndarray, tips: np.ndarray, scale: float) -> np.ndarray:
     """Tips that run into each other, (k, 2) int array: where the shortest paths around a loop do."""
-    tips = np.flatnonzero(tips)
-    beside = np.empty(len(vertices), int)
+    tips, beside = np.flatnonzero(tips), np.empty(len(vertices), int)
     beside[edges.ravel()] = edges[:, ::-1].ravel()
     ahead = unit(vertices[tips] - vertices[beside[tips]])
     a, b = cKDTree(vertices[tips]).query_pairs(MEETING_SCALES * scale, output_type="ndarray").T
@@ -217,8 +216,7 @@ def spread_around(skeleton: Skeleton) -> np.ndarray:
     some = np.flatnonzero(skeleton.vertex_of_point >= 0)
     vertex, points = skeleton.vertex_of_point[some], skeleton.points[some]
     edge, t = nearest_on_edges(skeleton.vertices, edges, incident_edges(edges, m)[vertex], points)
-    start, stop = skeleton.vertices[edges[edge]].transpose(1, 0, 2)
-    away = norm(points - start - t[:, None] * (stop - start))
+    away = norm(points - places_on_edges(skeleton.vertices, edges, edge, t))
     around = steps(linked(skeleton.vertices, edges))[vertex]
     return group_median(np.repeat(away, np.diff(around.indptr)), around.indices, m)
 
