@@ -222,7 +222,7 @@ def _object(skeleton: Skeleton, cloud: Any) -> np.ndarray:
         return np.empty((0, 3))
     if cloud is None and len(skeleton.points) == 0:
         raise InvalidParameterError(
-            "this skeleton has no points of the object: give cloud=points, or cloud=() to check nothing"
+            "this skeleton has no points of the object: give its cloud (--cloud), or cloud=() to check nothing"
         )
     points = skeleton.points if cloud is None else cloud_points(cloud)
     return points[np.isfinite(points).all(axis=1)]
@@ -234,7 +234,7 @@ def _check(skeleton: Skeleton, clearance: Any, around: Any, spacing: Any, min_co
     if not np.isfinite(skeleton.radii).any():
         raise InvalidParameterError("grasps need finite vertices and radii: save skeletons as .json, .npz or .ply")
     if min_confidence != 0 and np.isnan(skeleton.confidence).all():
-        raise InvalidParameterError("this skeleton has no confidence, perhaps due to its file: give min_confidence=0")
+        raise InvalidParameterError("this skeleton has no confidence: give min_confidence=0 (--min-confidence 0)")
     check_number("clearance", clearance, low=0)
     check_number("spacing", spacing, "float?", low=0, open_low=True)
     check_number("min_confidence", min_confidence, low=0, high=1)

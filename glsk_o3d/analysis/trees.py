@@ -93,12 +93,12 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
     """
     if skeleton.n_loops:
         raise InvalidParameterError(
-            f"the skeleton has {skeleton.n_loops} loops: cylinders need a tree; see pipelines.tree()"
+            f"the skeleton has {skeleton.n_loops} loops: cylinders need a tree; see pipelines.tree() (--pipeline tree)"
         )
     if skeleton.n_components > 1:
         raise InvalidParameterError(
-            f"the skeleton has {skeleton.n_components} components: cylinders need one tree; see pipelines.tree() and "
-            "editing.largest_component()"
+            f"the skeleton has {skeleton.n_components} components: cylinders need one tree; see pipelines.tree() "
+            "(--pipeline tree) and editing.largest_component() (glsk edit --largest)"
         )
     if not np.isfinite(skeleton.radii).all():
         raise InvalidParameterError("the skeleton has no radii: a file of a format without them was read")

@@ -19,17 +19,6 @@ from .console import echo, flags, say
 from .options import Json, Quiet, Verbose
 
 FAILURE_CODE, USAGE_CODE, INTERRUPTED_CODE = 1, 2, 130
-OPTIONS = {
-    "drop_invalid=True": "--drop-invalid",
-    "cut_loops=True (--cut-loops)": "--cut-loops",
-    "max_opening =": "--opening =",
-    "min_confidence=0": "--min-confidence 0",
-    "cloud=points, or cloud=() to check nothing": "--cloud FILE",
-    "pipelines.tree()": "'glsk skeletonize --pipeline tree'",
-    "editing.largest_component()": "'glsk edit --largest'",
-    "save_report and save_preview (--report, --preview)": "--report and --preview",
-}
-"""What cures are called in Python, and on the command line."""
 
 
 class WrongUsage(InvalidParameterError):
@@ -78,7 +67,7 @@ def reporting(cloud: Path | None = None, *, quiet: bool = False, verbose: bool =
         return
     if verbose:
         echo("".join(traceback.format_exception(problem)).rstrip("\n"), err=True)
-    message, code = _on_the_command_line(in_words(problem)), FAILURE_CODE
+    message, code = in_words(problem), FAILURE_CODE
     if isinstance(problem, KeyboardInterrupt):
         message, code = "interrupted; no file is half-written", INTERRUPTED_CODE
     elif isinstance(problem, MemoryError):
@@ -89,13 +78,6 @@ def reporting(cloud: Path | None = None, *, quiet: bool = False, verbose: bool =
         message = f"{cloud}: {message}"
     say("error", message)
     raise typer.Exit(code)
-
-
-def _on_the_command_line(message: str) -> str:
-    """A message of the library with the options of the commands instead of those of Python."""
-    for python, option in OPTIONS.items():
-        message = message.replace(python, option)
-    return message
 
 
 @contextmanager
@@ -110,7 +92,7 @@ def _warnings_as_lines() -> Iterator[None]:
         finally:
             told = dict.fromkeys(str(it.message) for it in caught if issubclass(it.category, ours))
             for line in () if flags.quiet else told:
-                say("warning", _on_the_command_line(line))
+                say("warning", line)
     for it in caught:
         if not issubclass(it.category, ours):
             warnings.showwarning(it.message, it.category, it.filename, it.lineno)

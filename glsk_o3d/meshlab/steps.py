@@ -37,7 +37,7 @@ class Step:
             yield
         except GlskError as error:
             place = f"{self.place}: " if self.place else ""
-            said = str(error).replace("drop_invalid=True", "the parameter sampler_drop_invalid")
+            said = str(error).replace("drop_invalid (--drop-invalid)", "the parameter sampler_drop_invalid")
             raise ScriptError(f"{place}filter {self.call.name!r}: {said}") from error
 
 

@@ -80,7 +80,7 @@ def not_finite(n: int, total: int, first: int) -> InvalidCloudError:
         return InvalidCloudError(f"none of its {n} points has finite coordinates: there is no cloud to work with")
     return InvalidCloudError(
         f"{n} of {total} points have NaN or infinite coordinates, the first at index {first}: drop them with "
-        "drop_invalid=True, or remove them first"
+        "drop_invalid (--drop-invalid), or remove them first"
     )
 
 

@@ -136,7 +136,7 @@ def test_without_a_display_it_names_what_else_there_is(glsk, monkeypatch, y):
     monkeypatch.setenv("DISPLAY", ":4242")
     run = glsk("view", y)
     assert run.returncode == 1
-    assert run.stderr.startswith("glsk: error: there is no display to open a window on: --report and --preview")
+    assert run.stderr.startswith("glsk: error: there is no display to open a window on: save_report and save_pre")
     assert run.stderr.count("\n") == 1
 
 

@@ -15,8 +15,8 @@ TABLE = """
     2 branches y.ply -o y.txt                              | y.txt: the table is CSV and its name ends in .csv
     2 tree y.ply --root a,b,c                              | root = 'a,b,c': must be an axis
     2 tree y.ply --unit 0                                  | unit = 0.0: must be above 0
-    2 tree o.ply                                           | see 'glsk skeletonize --pipeline tree'
-    2 tree two.json                                        | --pipeline tree' and 'glsk edit --largest'
+    2 tree o.ply                                           | see pipelines.tree() (--pipeline tree)
+    2 tree two.json                                        | editing.largest_component() (glsk edit --largest)
     2 tree y.ply -o c.xlsx                                 | c.xlsx: the file is a table of cylinders and its name ends
     2 edit o.ply                                           | nothing to write: give an output with -o
     2 edit o.ply -o o.ply                                  | o.ply: is an input
@@ -27,14 +27,14 @@ TABLE = """
     1 rig y.ply y.ply -o r.glb                             | y.ply: is a skeleton, not a scan
     1 rig y.ply junk.ply -o r.glb                          | junk.ply: not a valid .ply file: it does not start with
     1 rig y.ply nan.xyz -o r.glb                           | nan.xyz: the surface has points that are not finite: drop
-    1 rig o.ply -o r.glb                                   | 1 loop(s): pass --cut-loops to drop
+    1 rig o.ply -o r.glb                                   | 1 loop(s): pass cut_loops=True (--cut-loops) to drop
     1 rig bare.obj -o r.glb                                | a rig needs radii or points: read the skeleton from
-    2 grasps rod.npz --opening -1                          | --opening = -1.0: must be above 0
+    2 grasps rod.npz --opening -1                          | max_opening = -1.0: must be above 0
     2 grasps rod.npz --opening 1 --plane 0,0,1             | must be finite a, b, c, d of ax + by + cz + d = 0
     2 grasps rod.npz --opening 1 --plane 0,0,0,1           | must be finite a, b, c, d of ax + by + cz + d = 0
     2 grasps rod.npz --opening 1 -o g.ply                  | the grasps are JSON or CSV and its name ends in .json
-    2 grasps y.ply --opening 1                             | has no confidence, perhaps due to its file: give --min-
-    2 grasps y.ply --opening 1 --min-confidence 0          | has no points of the object: give --cloud FILE
+    2 grasps y.ply --opening 1                             | has no confidence: give min_confidence=0 (--min-
+    2 grasps y.ply --opening 1 --min-confidence 0          | has no points of the object: give its cloud (--cloud)
     1 grasps rod.npz --opening 1 --cloud none.ply          | none.ply: no such file
     1 evaluate y.ply SCANS/ring.ply --truth none.npz       | none.npz: not a valid truth: the truth has no nodes
     1 evaluate dot.ply SCANS/ring.ply                      | dot.ply: the skeleton has no edge with a length
@@ -68,7 +68,7 @@ BEFORE_ANY_RUN = """
     1 skeletonize none.ply -o s.ply                        | none.ply: no such file
     1 skeletonize SCANS/empty.ply -o s.ply                 | empty.ply: the file is empty
     1 skeletonize folder.ply -o s.ply                      | folder
-    1 skeletonize SCANS/nan.ply -o s.ply                   | the first at index 3: drop them with --drop-invalid
+    1 skeletonize SCANS/nan.ply -o s.ply                   | index 3: drop them with drop_invalid (--drop-invalid)
     1 skeletonize none.xyz -o s.ply                        | none.xyz: none of its 20 points has finite coordinates
     2 run                                                  | a SCRIPT and a SCAN are needed
     2 run glskeleton SCANS/ring.ply                        | nothing to write
