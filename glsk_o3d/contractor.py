@@ -63,7 +63,7 @@ class Contractor(Filter[Contraction]):
     consumes: ClassVar[type] = Contraction
 
     reducer: Reducer | None = parameter(
-        None, "Merges redundant points after each solve; None keeps them all.", type="reducer?"
+        None, "Merges redundant points after solves; None keeps them all.", type="reducer?"
     )
     stop: StopRule = parameter(ExplainedScore(), "Decides after each solve whether to stop.", type="stop")
     max_iterations: int = parameter(10, "Most solves.", unit="solves", low=1)
@@ -79,9 +79,7 @@ class Contractor(Filter[Contraction]):
         30.0, "Factor on W_H where the cloud is a line already: more contraction would only shorten it.", low=1
     )
     keep_last: bool = parameter(True, "Keep the solve after which the rule says stop.")
-    retries: int = parameter(
-        3, "Times a solve that throws points out of the box is repeated with these points held.", low=0
-    )
+    retries: int = parameter(3, "Times a solve that throws points out of the box is repeated with these held.", low=0)
     max_attraction: float = parameter(1e4, "Cap of W_H.", low=0, open_low=True)
 
     def _run(self, state: Contraction, watch: Watch | None) -> Contraction:

@@ -71,9 +71,7 @@ class Refiner(Filter[Skeleton]):
     handle: float = parameter(
         0.5, "Least probability that a loop is a handle of the object; others are closed. 0 keeps all.", low=0, high=1
     )
-    air: float = parameter(
-        0.5, "Least probability that a branch crosses air for a cut there. 0 cuts none.", low=0, high=1
-    )
+    air: float = parameter(0.5, "Least probability that a branch crosses air for a cut. 0 cuts none.", low=0, high=1)
     bridge: float = parameter(
         0.5, "Least probability that the object continues across a gap for a bridge. 0 bridges none.", low=0, high=1
     )

@@ -84,9 +84,7 @@ class Thinner(Filter[Points]):
             points = _merged(points, thin_nearer(here, points.neighbours, apart))
         report = points.report
         if report.is_sampled and self.thin_to != "auto" and self.thin_to > report.n_sampled:
-            told = (
-                f"Thinner.thin_to = {self.thin_to}: the Sampler left {report.n_sampled} points: set Sampler.size, too"
-            )
+            told = f"Thinner.thin_to = {self.thin_to}: the Sampler left {report.n_sampled} points: set Sampler.size"
             points = replace(points, report=report.with_warning(told))
         most = default_size(report.n_input - report.n_dropped) if self.thin_to == "auto" else self.thin_to
         if most < len(points):

@@ -145,10 +145,8 @@ def compare(skeleton: Skeleton, truth: Any) -> Comparison:
     known = np.isfinite(curve_radius)
     radius_error = np.abs(curve_radius - radius)[known] / radius[known]
 
-    mine_counts, true_counts = structure(skeleton), structure(axis)
-    difference = {
-        name: mine_counts[name] - true_counts[name] for name in ("components", "loops", "leaves", "junctions")
-    }
+    mine, true = structure(skeleton), structure(axis)
+    difference = {name: mine[name] - true[name] for name in ("components", "loops", "leaves", "junctions")}
     topology = difference["components"] == 0 == difference["loops"]
     tips, tip_radius = axis.vertices[axis.leaves], axis.radii[axis.leaves]
     ends = skeleton.vertices[skeleton.leaves] if len(skeleton.leaves) else skeleton.vertices

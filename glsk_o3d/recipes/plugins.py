@@ -73,9 +73,7 @@ def _check_filter(name: str, cls: Any) -> None:
         raise _Unfit(f"the entry point must have the name of the class, {cls.__name__!r}")
     for field in dataclasses.fields(cls):  # type: ignore[arg-type]
         if "type" not in field.metadata or field.name in RESERVED_WORDS:
-            raise _Unfit(
-                f"its field {field.name!r} is not made by glsk_o3d.parameters.parameter, or recipes use its name"
-            )
+            raise _Unfit(f"its field {field.name!r} is not made by glsk_o3d.parameters.parameter, or recipes use it")
     if not issubclass(cls, Filter):
         if not callable(cls()):
             raise _Unfit("a stopping rule must be callable")

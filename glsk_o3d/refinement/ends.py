@@ -196,7 +196,7 @@ class _End(NamedTuple):
         return step[:, None] * self.way + (step**2 / 2)[:, None] * self.bend
 
     def tip(self, taper: _Taper) -> tuple[float, float]:
-        """How far the limb goes on, and the radius that it has there at most.
+        """How far the limb goes on, and the largest radius that it has there, infinite if it is not known.
 
         Where its last points are much nearer to the axis than it is thick, as on the neck of a bottle, it has the cap
         of that thinner limb.
@@ -206,10 +206,7 @@ class _End(NamedTuple):
         return self._cap(taper if np.isinf(thin) else _Taper(thin, 0.0), reach), thin
 
     def _thinner(self, radius: float, reach: float) -> float:
-        """Radius of the last points, those nearer to the reach than it is, if much less than that of the limb.
-
-        Else, and where all are on one side, infinite.
-        """
+        """Radius of the points nearer to the reach than it is, if much less than the limb's and they are all around."""
         given, centre = radius, np.zeros(3)
         for _ in range(END_ROUNDS):
             late = self.length > reach - radius
@@ -274,8 +271,6 @@ def _turn_and_bend(
 
 def _replanted(skeleton: Skeleton, grown: list[_Grown]) -> Skeleton:
     """With new ends instead of those that were cut."""
-    if not grown:
-        return skeleton
     m = len(skeleton.vertices)
     members = Members(skeleton.vertex_of_point, m)  # those without a normal, too
     keep, owner = np.ones(m, bool), skeleton.vertex_of_point.copy()
