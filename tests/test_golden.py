@@ -160,9 +160,7 @@ def test_first_pass_keeps_the_same_points_and_merges_the_same_pairs(golden):
 def test_rings_after_the_first_pass(golden):
     z, reduced = golden.recorded, golden.reduced
     name = np.flatnonzero(z.keep1)  # their indices count the survivors
-    recorded = [
-        (name[row].tolist(), closed) for row, closed in as_recorded(z.ring_after1_indptr, z.ring_after1_indices)
-    ]
+    recorded = [(name[k].tolist(), closed) for k, closed in as_recorded(z.ring_after1_indptr, z.ring_after1_indices)]
     built = as_built(reduced.rings, reduced.point_of_survivor)
     at = np.empty(len(z.points), int)
     at[reduced.point_of_survivor] = np.arange(len(reduced))

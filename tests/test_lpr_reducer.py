@@ -88,9 +88,7 @@ def test_matching_is_greedy(pairs):
 
 
 def test_mending_leaves_fewer_points_that_nothing_surrounds():
-    broken = [
-        (contracted(CLOUDS["torus"], 6, LPRReducer(mend_rings=mend)).rings.sizes < 3).sum() for mend in (False, True)
-    ]
+    broken = [(contracted(CLOUDS["torus"], 6, LPRReducer(mend_rings=on)).rings.sizes < 3).sum() for on in (False, True)]
     assert broken[1] < broken[0]
 
 
@@ -149,7 +147,5 @@ def test_rings_of_flat_parts_are_those_of_their_plane():
     tilted = replace(state, laplacian_coordinates=1e-15 * rng.normal(size=state.positions.shape))
     pairs = np.array([0]), state.rings[0][:1]
     for case in (state, tilted):
-        ring = combine_rings(case, *pairs)
-        np.testing.assert_array_equal(
-            ring[0], combine_rings(replace(case, laplacian_coordinates=case.normals), *pairs)[0]
-        )
+        known = replace(case, laplacian_coordinates=case.normals)
+        np.testing.assert_array_equal(combine_rings(case, *pairs)[0], combine_rings(known, *pairs)[0])

@@ -90,9 +90,7 @@ def test_equations_are_set_in_the_font_that_comes_with_the_site(visit):
     assert len(letters) > 100
     used = set()
     for letter in letters[:100]:
-        used |= {
-            font["familyName"] for font in session.send("CSS.getPlatformFontsForNode", {"nodeId": letter})["fonts"]
-        }
+        used |= {it["familyName"] for it in session.send("CSS.getPlatformFontsForNode", {"nodeId": letter})["fonts"]}
     assert used == {"Glsk Math"}
     raised = "[...document.querySelectorAll('math :is(msup, msubsup) > :last-child')].map((part) => part.textContent)"
     assert "′" not in "".join(tab.evaluate(raised))  # fonts have it raised already

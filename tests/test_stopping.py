@@ -9,9 +9,7 @@ from glsk_o3d import ExplainedScore, IterationRecord, RingSizeRatio
 
 def records(**columns):
     """Iteration records with the given columns; everything else is as far from a stop as can be."""
-    rest = dict.fromkeys((field.name for field in fields(IterationRecord)), 1) | dict(
-        explained_change=9.0, ring_ratio=0.5
-    )
+    rest = dict.fromkeys((f.name for f in fields(IterationRecord)), 1) | dict(explained_change=9.0, ring_ratio=0.5)
     rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
     return tuple(IterationRecord(**(rest | row | dict(iteration=i))) for i, row in enumerate(rows, start=1))
 

@@ -165,9 +165,8 @@ def test_scan_lines_much_denser_than_they_are_apart_are_a_surface():
     """The nearest points of each are of its own line, and show no plane; among those that are left they do."""
     height, turn = np.meshgrid(np.linspace(0, 3, 44), np.linspace(0, 2 * np.pi, 450, endpoint=False))
     turn = turn + 6 * np.random.default_rng(0).random(44)
-    found = pipelines.default()(
-        np.column_stack([0.3 * np.cos(turn).ravel(), 0.3 * np.sin(turn).ravel(), height.ravel()])
-    )
+    lines = np.stack([0.3 * np.cos(turn), 0.3 * np.sin(turn), height], axis=-1)
+    found = pipelines.default()(lines.reshape(-1, 3))
     assert found.report.n_contracted < 3000
     assert (found.n_components, found.n_loops, len(found.leaves)) == (1, 0, 2)
 

@@ -148,9 +148,8 @@ def test_junctions_less_than_a_radius_apart_are_one(gap, share, curve):
     assert found.junctions_f1 == pytest.approx(share)
     assert (found.tips_f1, found.perfect, found.junctions) == (1, True, 1)
     vertices, edges = cross(gap)
-    assert compare(curve(nodes, true.edges), Truth(vertices, edges, np.full(6, 0.2))).junctions_f1 == pytest.approx(
-        share
-    )
+    other = Truth(vertices, edges, np.full(6, 0.2))
+    assert compare(curve(nodes, true.edges), other).junctions_f1 == pytest.approx(share)
 
 
 @pytest.mark.parametrize(("away", "share"), [(0.38, 1), (0.42, 0)])

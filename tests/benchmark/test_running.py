@@ -49,9 +49,7 @@ def times_in(place):
 
 def test_a_good_program(go, small, program, tmp_path):
     told = []
-    result = go(
-        program("write(skeleton)"), on_cloud=lambda name, outcome, done, total: told.append((name, done, total))
-    )
+    result = go(program("write(skeleton)"), on_cloud=lambda name, outcome, done, n: told.append((name, done, n)))
     assert result == RunResult(7, 0, 0, {})
     assert told == [(cloud.name, done, 7) for done, cloud in enumerate(small.scored, 1)]
     names = sorted(path.name for path in (tmp_path / "out").iterdir())

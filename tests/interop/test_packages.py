@@ -33,9 +33,7 @@ def test_extras_and_libraries_are_those_of_the_project(root):
     extras = tomlkit.parse((root / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     names = {"igl": "libigl"}
     for module, extra in packages.EXTRA_OF.items():
-        asked = [
-            key for key in extras if any(line.startswith(f"{names.get(module, module)}>=") for line in extras[key])
-        ]
+        asked = [key for key in extras if any(it.startswith(f"{names.get(module, module)}>=") for it in extras[key])]
         assert asked == [extra]
     script = (root / "scripts" / "system-deps.sh").read_text()
     assert set(re.findall(r"=(lib[\w.-]+)", script)) <= set(packages._OPEN3D_LIBRARIES.split())

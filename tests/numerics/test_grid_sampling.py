@@ -49,9 +49,7 @@ def test_a_sample_of_a_sample_counts_all_points():
 def test_memory_does_not_grow_with_the_cloud():
     def peak(n):
         tracemalloc.start()
-        sample_blocks(
-            lambda: (np.random.default_rng(seed).normal(size=(20000, 3)) for seed in range(n)), lambda _: 2000
-        )
+        sample_blocks(lambda: (np.random.default_rng(k).normal(size=(20000, 3)) for k in range(n)), lambda _: 2000)
         most = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         return most

@@ -265,7 +265,5 @@ def test_every_end_is_joined_once(piped, refine):
     """Three ends meet: the two in line are surer."""
     skeleton = refine(piped([*PARTS, [(0, 0.3, 0), (0, 1, 0)]]), bridge=0.01)
     assert skeleton.degree.max() <= 3
-    joined = [
-        sorted(skeleton.vertices[edge, 0].tolist()) for edge in skeleton.edges if skeleton.edge_lengths.max() > 0.2
-    ]
+    joined = [sorted(skeleton.vertices[e, 0].tolist()) for e in skeleton.edges if skeleton.edge_lengths.max() > 0.2]
     assert [-0.15, 0.15] in joined

@@ -97,9 +97,7 @@ def test_dots_do_not_bury_short_branches(make):
 def test_the_root_is_marked(tree):
     rooted = dataclasses.replace(tree, report=dataclasses.replace(tree.report, root=tuple(tree.vertices[0].tolist())))
     for skeleton, n in ((tree, 0), (rooted, 3)):
-        marks = [
-            each for axes in preview.draw(skeleton).axes for each in axes.collections if each.get_label() == "root"
-        ]
+        marks = [it for axes in preview.draw(skeleton).axes for it in axes.collections if it.get_label() == "root"]
         assert len(marks) == n
 
 
