@@ -164,7 +164,7 @@ class Skeleton:
         """Total length of the edges, in the cloud's units."""
         return float(self.edge_lengths.sum())
 
-    @cached_property
+    @property
     def edge_lengths(self) -> np.ndarray:
         """Length of every edge, (E,) float array."""
         ends = self.vertices[self.edges]

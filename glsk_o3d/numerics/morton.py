@@ -37,7 +37,7 @@ def morton_codes(
     `cells`, at most 2^21 - 1, lie along the longest side. Another box around the points has the lowest corner `corner`
     (3,) and the longest side `extent`.
     """
-    low, high = box(points)
+    low, high = box(points) if corner is None or extent is None else (corner, corner + extent)
     corner, extent = low if corner is None else corner, max((high - low).max() if extent is None else extent, TINY)
     code = np.zeros(len(points), np.uint64)
     for axis, column in enumerate(points.T):

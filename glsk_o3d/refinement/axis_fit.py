@@ -20,7 +20,7 @@ from .evidence import SurfaceGraph
 from .merging import with_fields
 from .sections import Sections, VertexPoints, half_axes, measure_sections, normal_moments
 
-FIT_STIFFNESS = 1.0  # fitted: length over which the curve hardly bends, over the half axis of its section there
+FIT_STIFFNESS = 1.0  # fitted: length over which the curve hardly bends, over the half width of its section
 FIT_DIFFUSION = 0.6  # fitted: length over which the places of points are smoothed on the surface, over that
 FIT_WIDEST = 10.0  # fitted: half width over the spacing of the vertices, at most: those in one place have none
 FIT_STAY = 0.1  # fitted: weight of staying where it was, per point
@@ -61,9 +61,8 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
         + \sum_v c (|\Lambda (x_v - chord)|^2 + \epsilon |x_v - old|^2 + ((x_v - old) \cdot t)^2)
 
     with c points at a vertex. :math:`\Lambda` is :math:`(w / h)^2` with the half width w and the spacing h of the
-    vertices, so that the curve does not bend within a half width; in the direction of the thickness it has half of that
-    in place of w: a strap bends where it is thin, and not where it is wide. The nearest place of a wiggly curve has its
-    wiggle: it is smoothed on the surface by .6 half widths, and x(p) is the place nearest to that.
+    vertices, so that the curve does not bend within a half width. The nearest place of a wiggly curve has its wiggle:
+    it is smoothed on the surface by .6 half widths, and x(p) is the place nearest to that.
 
     K is 0, since the axis of half a tube is off the centroid of its points, but where it is to `settle` the curve:
 
@@ -72,7 +71,8 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
     The doubt d, from 0 to 1, is the share of the distance from the curve that the normals do not explain: noise as wide
     as the part, whose points say more than their normals. Of a leaf seen from one side the normals hardly differ, and
     meet far behind it: e is the direction most of them have, a the share of their squares across it, and a_0 that of a
-    quarter of a tube. An edge has the mean K of its two ends, and of it what is across the edge.
+    quarter of a tube. An edge has the mean K of its two ends, and of it what is across the edge. Then
+    :math:`\Lambda` has the half thickness in place of w in its direction: a strap bends where it is thin.
 
     The confidence is (1 - d) c / (c + 8), where c counts over the vertex and its neighbours. The radii are those of
     circles with the area of the section, see `robust_radii`, or without passes `plane_distance_radii`. Points belong to
@@ -97,8 +97,7 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
         place = smooth(places_on_edges(x, ends, *onto), FIT_DIFFUSION * near.width[vertex])
         vertex, edge, t = _walked(x, ends, edges_at, vertex, place)
         near = _nearest(x, ends, edge, t, p, n, skeleton.radii)
-        pull = _pull(near) if settle else np.zeros((m, 3, 3))
-        x = _solve(x, near, p, pull[ends].mean(axis=1), pattern)
+        x = _solve(x, near, p, pattern, settle)
         # normals that mean nothing may meet anywhere
         x = np.where(skeleton.degree[:, None] > 0, np.clip(x, low, high), x)
     if passes:
@@ -218,10 +217,11 @@ def _spread_width(moments: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(3 * most - np.clip(less, 0, most), 0))
 
 
-def _solve(x: np.ndarray, near: _Nearest, p: np.ndarray, pull: np.ndarray, pattern: _Pattern) -> np.ndarray:
-    """The minimum of the energy in `fit_axis`, K at every edge: one sparse, symmetric, positive definite system."""
+def _solve(x: np.ndarray, near: _Nearest, p: np.ndarray, pattern: _Pattern, settle: bool) -> np.ndarray:
+    """The minimum of the energy in `fit_axis`: one sparse, symmetric, positive definite system."""
     ends, inner, beside = pattern.ends, pattern.inner, pattern.beside
     m, e = len(x), len(ends)
+    pull = _pull(near)[ends].mean(axis=1) if settle else np.zeros((e, 3, 3))
     along = near.tangent[:, :, None] * near.tangent[:, None]
     upright = np.eye(3) - along
     pull = upright @ pull @ upright
@@ -246,12 +246,12 @@ def _solve(x: np.ndarray, near: _Nearest, p: np.ndarray, pull: np.ndarray, patte
     chord = reach[:, ::-1] / np.maximum(reach.sum(axis=1, keepdims=True), TINY)
     stencil = np.column_stack([np.ones(len(inner)), -chord])
     squared = np.maximum(reach.prod(axis=1), TINY)
-    flat = near.sections.half_thickness[inner] / np.maximum(near.sections.half_width[inner], TINY)
-    half = near.width[inner, None] * np.column_stack([np.ones(len(inner)), flat])
-    stiff = np.minimum(FIT_STIFFNESS**2 * half**2 / squared[:, None], FIT_WIDEST**2) ** 2
-    wide, thin = np.maximum(count[inner], 1) * stiff.T
-    flat = unit(np.cross(x[beside[:, 1]] - x[beside[:, 0]], near.sections.across[inner]))
-    stiff = wide[:, None, None] * np.eye(3) + (thin - wide)[:, None, None] * flat[:, :, None] * flat[:, None]
+    flat = near.sections.half_thickness / np.maximum(near.sections.half_width, TINY) if settle else np.ones(m)
+    half = np.stack([near.width, near.width * flat])[:, inner]
+    half = np.minimum((FIT_STIFFNESS * half) ** 2, FIT_WIDEST**2 * squared) / squared
+    wide, thin = np.maximum(count[inner], 1) * half**2
+    normal = unit(cross(x[beside[:, 1]] - x[beside[:, 0]], near.sections.across[inner]))
+    stiff = wide[:, None, None] * np.eye(3) + (thin - wide)[:, None, None] * normal[:, :, None] * normal[:, None]
     bend = (stencil[:, :, None] * stencil[:, None])[..., None, None] * stiff[:, None, None]
     blocks = np.concatenate([at_edges[0], at_edges[1], at_edges[1], at_edges[2], stay, bend.reshape(-1, 3, 3)])
     return factorised(pattern.matrix(blocks)).solve(right.ravel()).reshape(m, 3)

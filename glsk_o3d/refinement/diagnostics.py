@@ -8,7 +8,6 @@ from ..decisions import coordinates
 from ..numerics.groups import component_labels, group_median, group_sum
 from ..numerics.vectors import dot, norm
 from ..skeleton import Skeleton
-from .merging import with_fields
 from .sections import VertexPoints, measure_sections
 
 SHEET_SHARE = 0.9  # fitted: share of one direction among the normals around a vertex; a tube has 0.5, half a tube too
@@ -33,7 +32,7 @@ def measured(skeleton: Skeleton) -> Skeleton:
     sections = measure_sections(skeleton)
     others = [message for message in skeleton.report.warnings if message.partition(":")[0] not in REASONS]
     report = replace(skeleton.report, warnings=(*others, *diagnose(skeleton)))
-    return with_fields(skeleton, report=report, half_width=sections.half_width, half_thickness=sections.half_thickness)
+    return replace(skeleton, report=report, half_width=sections.half_width, half_thickness=sections.half_thickness)
 
 
 def diagnose(skeleton: Skeleton) -> list[str]:

@@ -26,7 +26,8 @@ END_BENDING = 0.5  # fitted: weight of going straight on, twice lambda
 END_ROUNDS = 3  # measured: from then on hardly anything moves
 END_LEFT = 0.25  # fitted: share of a branch from a junction that is left, at least, to say where it leads
 END_POINTS = 4  # derived: fewer cannot say where a limb turns
-END_THINNER = 2 / 3  # derived: over its limb's radius, that of a neck; a round cap of a limb seems to have .76 of it
+END_THINNER = 2 / 3  # measured: over its limb's radius, that of a neck at most; a round cap seems to have .85 of it
+END_SIDES = 1 / 3  # derived: share of the last points that are sides, at least; 2/3 at a flat end, none on its face
 ONE_SIDED = 1 / np.pi  # derived: radii from the axis to the mean of points around it, between half a tube's and none
 CURVE_SAMPLES = 64  # derived: places along a parabola that say its length to 1e-3 of the whole
 WAY_SAMPLES = 16  # derived: places along a run that say its direction, several on each of its few edges
@@ -53,7 +54,7 @@ def regrow_ends(skeleton: Skeleton) -> Skeleton:
     radius counts half, and those beyond the reach do not count. The fit is made three times, each along t + d of the
     one before. See `_End.tip` and `_End._cap` for where it stops. No end leaves its points.
 
-    New vertices come behind all others, with the radius and the confidence of the run behind, or thinner and thinner.
+    New vertices come behind all others, with the confidence of the run behind and its radius, which falls to a neck's.
     Points of a vertex that was cut belong to the nearest one of the same end. Loops and vertices without edges stay.
     """
     if not len(skeleton.leaves):
@@ -217,7 +218,10 @@ class _End(NamedTuple):
             normals = self.normals[late] - dot(self.normals[late], tangent)[:, None] * tangent
             away = self.points[late] - self.curve(length)
             centre = away.mean(axis=0)
-            across = norm(normals) @ np.abs(dot(away, normals)) / max(dot(normals, normals).sum(), TINY)
+            sides = dot(normals, normals).sum()
+            if sides < END_SIDES * late.sum():
+                return np.inf
+            across = norm(normals) @ np.abs(dot(away, normals)) / max(sides, TINY)
             radius = min(radius, float(across))
         around = np.linalg.norm(centre) < ONE_SIDED * radius
         return radius if around and radius < END_THINNER * given else np.inf

@@ -190,7 +190,7 @@ def meet(
     """
     place, touching, radius = near, radius, max(radius, TINY)
     known = [line for line in lines if line.spread > 0 and line.radius > 0]
-    middle, way = (np.array([line[k] for line in known]).reshape(-1, 3) for k in range(2))
+    middle, way = np.array([(line.middle, line.way) for line in known]).reshape(-1, 2, 3).transpose(1, 0, 2)
     spread, noise = np.array([(line.spread, line.bend / line.radius + LINE_NOISE) for line in known]).reshape(-1, 2).T
     across = np.eye(3) - way[:, :, None] * way[:, None]
     for _ in range(MEETING_ROUNDS):

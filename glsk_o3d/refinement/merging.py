@@ -29,13 +29,12 @@ def merge_vertices(skeleton: Skeleton, group: np.ndarray) -> Skeleton:
     n, weight = len(label), VertexPoints(skeleton).mass
     total = group_sum(weight, group, n)
     edges = np.sort(group[skeleton.edges], axis=1)
-    vertex = skeleton.vertex_of_point
     known = some_vertices(skeleton, np.arange(len(group)))
     return replace(
         skeleton,
         **{name: (group_sum((weight * values.T).T, group, n).T / total).T for name, values in known.items()},
         edges=np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0),
-        vertex_of_point=np.append(group, -1)[vertex],
+        vertex_of_point=np.append(group, -1)[skeleton.vertex_of_point],
     )
 
 
@@ -61,18 +60,17 @@ def drop_lone_vertices(skeleton: Skeleton) -> Skeleton:
         return skeleton
     representative = cKDTree(skeleton.vertices[left]).query(skeleton.vertices)[1]
     representative[left] = np.arange(len(left))
-    vertex = skeleton.vertex_of_point
     return replace(
         skeleton,
         **some_vertices(skeleton, left),
         edges=representative[skeleton.edges],
-        vertex_of_point=np.append(representative, -1)[vertex],
+        vertex_of_point=np.append(representative, -1)[skeleton.vertex_of_point],
     )
 
 
 def with_fields(skeleton: Skeleton, **fields: Any) -> Skeleton:
     """The same graph with other fields than its edges, as by `replace`, but unchecked, and what is known of it kept."""
-    made, known = object.__new__(Skeleton), vars(skeleton)
+    made, known = object.__new__(type(skeleton)), vars(skeleton)
     names = (*ARRAYS, "report", "degree", "component_of_vertex", "branches")
     vars(made).update({name: known[name] for name in names if name in known} | fields)
     return made

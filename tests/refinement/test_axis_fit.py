@@ -137,8 +137,8 @@ def test_a_hoop_bends_where_it_is_thin():
     normals = bar.normals[:, 2:] * away + bar.normals[:, 1:2] * [0, 0, 1]
     points = out[:, None] * away + bar.points[:, 1:2] * [0, 0, 1]
     vertices = np.column_stack([0.42 * np.cos(rim), 0.42 * np.sin(rim), 0 * rim + 0.02])
-    moved = fit_axis(path(vertices, points, normals, closed=True), 6)[0]
-    assert np.abs(np.hypot(moved[:, 0], moved[:, 1]) - big).max() < 0.2 * 0.06
+    moved = fit_axis(path(vertices, points, normals, closed=True), 6, settle=True)[0]
+    assert np.abs(np.hypot(moved[:, 0], moved[:, 1]) - big).max() < 0.25 * 0.06
     assert np.abs(moved[:, 2]).max() < 0.1 * 0.3
 
 
