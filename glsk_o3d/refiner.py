@@ -35,7 +35,7 @@ class Refiner(Filter[Skeleton]):
        one side was scanned; again after every change of the graph.
     4. The topology is judged by the surface around the curve: false loops are closed, spurs pruned, branches that cross
        air cut, and gaps bridged across which the object continues.
-    5. The curve settles: it is fitted once more, also to the points themselves where noise has spoilt the normals, and
+    5. The curve settles: it is fitted twice more, also to the points themselves where noise has spoilt the normals, and
        where they hardly differ, as of a leaf of which one side was scanned.
     6. Junctions move to where limbs meet, and ends grow along their limbs to where these stop.
     7. The sections are measured, and warnings are collected.
@@ -81,7 +81,7 @@ class Refiner(Filter[Skeleton]):
     spacing: float = parameter(0.5, "Longest edge over the local radius, by subdivision; 0 leaves the edges.", low=0)
     recentre: int = parameter(
         1,
-        "Passes of a fit of the curve to the axis of the surface; the last fit has one. 0 leaves it.",
+        "Passes of a fit of the curve to the axis of the surface; the last fit has one more. 0 leaves it.",
         unit="passes",
         low=0,
     )
@@ -97,7 +97,7 @@ class Refiner(Filter[Skeleton]):
         if len(skeleton.edges) and len(skeleton.supporting_points) and (asks or self.recentre):
             skeleton = self._decide(skeleton, surface)
         if self.recentre and len(skeleton.vertices):
-            skeleton = fit_axis(skeleton, 1, surface, settle=True)
+            skeleton = fit_axis(skeleton, self.recentre + 1, surface, settle=True)
             size = binary_size(skeleton)  # fourth powers of lengths must not overflow
             skeleton = scaled(regrow_ends(move_junctions(scaled(skeleton, 1 / size))), size)
         return measured(skeleton)
