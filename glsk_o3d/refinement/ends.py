@@ -60,8 +60,8 @@ def regrow_ends(skeleton: Skeleton) -> Skeleton:
     if not len(skeleton.leaves):
         return skeleton
     cloud, sections = VertexPoints(skeleton), measure_sections(skeleton)
-    grown = [_grow(cloud, sections, *end) for end in _ends(skeleton)]
-    return _replanted(skeleton, [found for found in grown if found])
+    grown = [found for end in _ends(skeleton) if (found := _grow(cloud, sections, *end))]
+    return _replanted(skeleton, grown) if grown else skeleton
 
 
 class _Grown(NamedTuple):
