@@ -116,5 +116,5 @@ def _weak_region(skeleton: Skeleton, count: np.ndarray) -> list[str]:
     reach, place = norm(region - middle).max(), coordinates(middle)
     return [
         f"weakly supported: around {share:.0%} of the points, above all within {reach:.3g} of ({place}), the points do "
-        "not agree on an axis: they are too sparse or too noisy for thin parts, or the parts are no tubes"
+        "not agree on an axis: they are too sparse or noisy, or their parts are no tubes, such as a table under it"
     ]
