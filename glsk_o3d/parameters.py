@@ -187,7 +187,7 @@ def problem_with(value: Any, facts: Any) -> str | None:
         percent = _percent(value)
         if percent is None:
             return "must be a number in the cloud's units or a percentage of its diagonal such as '2%'"
-        return None if SMALLEST_LENGTH <= percent <= 100 else "a share of the diagonal lies above 0% and up to 100%"
+        return None if SMALLEST_LENGTH <= percent <= 100 else "a percentage of the diagonal: above 0% and up to 100%"
     return _problem_with_number(value, kind == "int", facts)
 
 

@@ -125,7 +125,7 @@ def test_frozen_hashable_and_documented(cls):
     [
         (RingBuilder, dict(radius=1e308), r"^RingBuilder\.radius = 1e\+308: must be at most 1e\+100$"),
         (Connector, dict(radius=1e-320), r"^Connector\.radius = 1e-320: must be at least 1e-100$"),
-        (Connector, dict(radius="5e-324%"), "a percentage of the diagonal lies above 0%"),
+        (Connector, dict(radius="5e-324%"), "a percentage of the diagonal: above 0%"),
         (Connector, dict(thickness=Fraction(10**400)), r"^Connector\.thickness = .*: must be a number$"),
         (Tracer, dict(root=10**400), r"^Tracer\.root = 10{199}\.\.\.: must be 'x', .* a point such as"),
     ],

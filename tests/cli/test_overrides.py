@@ -96,7 +96,7 @@ def test_where_settings_go():
         ("RingBuilder.k=many", "RingBuilder.k = 'many': must be an int, or 'auto', or 'published'"),
         ("LPRReducer.phi=nan", "LPRReducer.phi = nan: must be finite"),
         ("LPRReducer.conserve_mass=maybe", "LPRReducer.conserve_mass = 'maybe': must be True or False"),
-        ("Connector.radius=101%", "a share of the diagonal lies above 0% and up to 100%"),
+        ("Connector.radius=101%", "a percentage of the diagonal: above 0% and up to 100%"),
     ],
 )
 def test_refuses(setting, message):
