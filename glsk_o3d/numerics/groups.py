@@ -22,6 +22,16 @@ def group_median(values: np.ndarray, group: np.ndarray, n: int) -> Floats:
     return median
 
 
+def first_in_their_place(points: np.ndarray) -> np.ndarray:
+    """The first of all points with the same coordinates, bool array: which of them is linked would be chance."""
+    if np.diff(np.sort(points[:, 0])).all():  # mostly, and then they need not be sorted by three coordinates
+        return np.ones(len(points), bool)
+    order = np.lexsort(points.T)
+    again, first = (np.diff(points[order], axis=0) == 0).all(axis=1), np.ones(len(points), bool)
+    first[order[1:][again]] = False
+    return first
+
+
 def quantile(values: np.ndarray, share: float = 0.5) -> float:
     """Quantile of some values, (n,) float array, n > 0: by default the median. NumPy takes ten times as long."""
     return float(np.interp(share * (len(values) - 1), np.arange(len(values)), np.sort(values)))

@@ -14,7 +14,8 @@ def morton_order(points: np.ndarray) -> np.ndarray:
     Points in one cell of it are sorted by their coordinates, so that the order says nothing of the one before; only
     equal points keep theirs.
     """
-    codes = morton_codes(points, FINEST_CELLS)
+    low, high = box(points)
+    codes = morton_codes(points, FINEST_CELLS, low, (high - low).max())
     return sort_within(points, codes, np.argsort(codes, kind="stable"))
 
 
@@ -29,19 +30,14 @@ def sort_within(points: np.ndarray, codes: np.ndarray, order: np.ndarray) -> np.
     return order
 
 
-def morton_codes(
-    points: np.ndarray, cells: float, corner: np.ndarray | None = None, extent: float | None = None
-) -> np.ndarray:
-    """Morton code of the cell of every point, (n,) uint64, in a cubic grid with its corner in that of the bounding box.
+def morton_codes(points: np.ndarray, cells: float, corner: np.ndarray, extent: float) -> np.ndarray:
+    """Morton code of the cell of every point, (n,) uint64, in a cubic grid around the points.
 
-    `cells`, at most 2^21 - 1, lie along the longest side. Another box around the points has the lowest corner `corner`
-    (3,) and the longest side `extent`.
+    `cells`, at most 2^21 - 1, lie along its side `extent`, and its lowest corner is `corner` (3,).
     """
-    low, high = box(points) if corner is None or extent is None else (corner, corner + extent)
-    corner, extent = low if corner is None else corner, max((high - low).max() if extent is None else extent, TINY)
     code = np.zeros(len(points), np.uint64)
     for axis, column in enumerate(points.T):
-        cell = ((column - corner[axis]) / extent * cells).astype(np.uint64)
+        cell = ((column - corner[axis]) / max(extent, TINY) * cells).astype(np.uint64)
         code |= _spread(cell) << np.uint64(axis)
     return code
 

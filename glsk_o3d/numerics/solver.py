@@ -6,6 +6,8 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array, csr_matrix
 from scipy.sparse.linalg import SuperLU, splu
 
+from .vectors import box
+
 # precision
 SOLVE_TOLERANCE = 1e-7  # of the cloud's size; refinement ends here
 SOLVE_ACCEPTABLE = 1e-4  # of the cloud's size; a solve that stalls above this is refused
@@ -51,7 +53,8 @@ def solve_contraction(
     except RuntimeError as error:
         raise SolveError(f"the contraction system cannot be factorised ({error})") from error
     x = factor.solve(transposed @ wanted)
-    size, error = np.ptp(points.T.copy(), axis=1).max(), np.inf  # along the memory it is ten times faster
+    low, high = box(points)
+    size, error = (high - low).max(), np.inf
     for _ in range(MAX_REFINEMENTS):
         correction = factor.solve(transposed @ (wanted - system @ x))
         change = np.abs(correction).max() / size

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .vectors import TINY, dot, norm
+from .vectors import TINY, box, dot, norm
 
 VOTING_ROUNDS = 10  # measured: more rounds gain in noise what they lose where thin parts are near
 AREA_NEIGHBOURS = 8  # measured: fewer scatter more, more reach across thin parts
@@ -58,7 +58,8 @@ def winding_number(points: np.ndarray, normals: np.ndarray, areas: np.ndarray, q
     """
     if not len(points):
         return np.zeros(len(queries))
-    centre, extent = points.mean(axis=0), np.ptp(points.T.copy(), axis=1).max() or 1.0
+    centre, (low, high) = points.mean(axis=0), box(points)
+    extent = (high - low).max() or 1.0
     p, area = (points - centre) / extent, areas / extent**2
     q = np.clip((queries - centre) / extent, -FARTHEST, FARTHEST)
     dipoles = normals * area[:, None] / (4 * np.pi)

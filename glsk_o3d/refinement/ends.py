@@ -196,6 +196,10 @@ class _End(NamedTuple):
         step: Floats = np.interp(length, self.along, self.steps) + np.maximum(length - self.along[-1], 0)
         return step[:, None] * self.way + (step**2 / 2)[:, None] * self.bend
 
+    def slope(self, length: np.ndarray) -> np.ndarray:
+        """Directions of the curve so far ahead, (k, 3) float array."""
+        return self.way + np.interp(length, self.along, self.steps)[:, None] * self.bend
+
     def tip(self, taper: _Taper) -> tuple[float, float]:
         """How far the limb goes on, and the largest radius that it has there, infinite if it is not known.
 
@@ -214,7 +218,7 @@ class _End(NamedTuple):
             if late.sum() < END_POINTS:
                 break
             length = self.length[late]
-            tangent = unit(self.way + np.interp(length, self.along, self.steps)[:, None] * self.bend)
+            tangent = unit(self.slope(length))
             normals = self.normals[late] - dot(self.normals[late], tangent)[:, None] * tangent
             away = self.points[late] - self.curve(length)
             centre = away.mean(axis=0)
@@ -240,7 +244,7 @@ class _End(NamedTuple):
         if late.sum() < END_POINTS:
             return max(reach - taper.at(reach) / 2, 0.0)
         length = self.length[late] - start
-        tangent = self.way + np.interp(self.length[late], self.along, self.steps)[:, None] * self.bend
+        tangent = self.slope(self.length[late])
         normals, points = self.normals[late], self.points[late] - self.curve(np.array([start]))
         outward = np.where(dot(normals, points) < 0, -1, 1) * dot(normals, tangent) / norm(tangent)
         # those of a cone lean outwards, too

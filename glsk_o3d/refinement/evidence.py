@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..numerics.diffusion import Diffusion
-from ..numerics.groups import group_rank
+from ..numerics.groups import first_in_their_place, group_rank
 from ..numerics.morton import morton_order
 from ..numerics.neighbourhoods import nearest_neighbours, uprightness
 from ..numerics.polylines import incident_edges, nearest_on_edges, places_on_edges
@@ -22,7 +22,6 @@ from .merging import with_fields
 
 # fitted: winding number below which an axis is in nothing; .5 on that of a tube seen from one side, .2 in sparse crowns
 LEAST_INSIDE = 0.4
-
 
 ENOUGH_POINTS = 4096  # measured: points of one object beyond which a surface hangs together in the same way
 VERTEX_POINTS = 32  # derived: points to a vertex of a tube with 20 around it, whose vertices are half a radius apart
@@ -181,13 +180,3 @@ def _nearest_edges(skeleton: Skeleton, supporting: np.ndarray) -> tuple[np.ndarr
     around = incident_edges(skeleton.edges, len(skeleton.vertices))[vertex]
     edge, t = nearest_on_edges(skeleton.vertices, skeleton.edges, around, skeleton.points[supporting])
     return np.where(skeleton.degree[vertex] > 0, edge, -1), t
-
-
-def first_in_their_place(points: np.ndarray) -> np.ndarray:
-    """The first of all points with the same coordinates, bool array: which of them is linked would be chance."""
-    if np.diff(np.sort(points[:, 0])).all():  # mostly, and then they need not be sorted by three coordinates
-        return np.ones(len(points), bool)
-    order = np.lexsort(points.T)
-    again, first = (np.diff(points[order], axis=0) == 0).all(axis=1), np.ones(len(points), bool)
-    first[order[1:][again]] = False
-    return first

@@ -7,13 +7,12 @@ from scipy.sparse import csr_matrix
 
 from ..numerics.eigen import largest_eigenvalue
 from ..numerics.grid_sampling import sample_cloud
-from ..numerics.groups import component_labels, group_sum
+from ..numerics.groups import component_labels, first_in_their_place, group_sum
 from ..numerics.near_links import link_growth, near_links
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.vectors import COLUMNS, ROWS, TINY
 from ..skeleton import Skeleton
 from .diagnostics import SHEET_SHARE
-from .evidence import first_in_their_place
 from .sections import VertexPoints
 
 SCALE_NEIGHBOUR = 8  # fitted: the nearest point whose distance is the scale of a point
@@ -98,8 +97,7 @@ def one_direction(normals: np.ndarray, links: csr_matrix) -> np.ndarray:
     along = normals[:, ROWS] * normals[:, COLUMNS]
     for _ in range(2):
         along = along + links.astype(bool) @ along
-    total = along[:, ROWS == COLUMNS].sum(axis=1)
-    return largest_eigenvalue(along.T) / np.maximum(total, TINY)
+    return largest_eigenvalue(along.T) / np.maximum(along[:, ROWS == COLUMNS].sum(axis=1), TINY)
 
 
 def _share_around(near: np.ndarray, count: np.ndarray, some: np.ndarray) -> np.ndarray:

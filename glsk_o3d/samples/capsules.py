@@ -69,8 +69,7 @@ def noisy(points: Floats, noise: float, rng: np.random.Generator) -> np.ndarray:
     """The points with Gaussian noise, which is a share of the diagonal of their box."""
     if noise == 0:
         return points
-    diagonal = np.linalg.norm(np.ptp(points, axis=0))
-    return points + rng.normal(scale=noise * diagonal, size=points.shape)
+    return points + rng.normal(scale=noise * np.linalg.norm(np.ptp(points, axis=0)), size=points.shape)
 
 
 def directions(n: int, rng: np.random.Generator) -> np.ndarray:
