@@ -45,7 +45,7 @@ QUESTIONS = {
         "spur pruned",
         "limb",
         False,
-        {"constant": -5.4, "protrusion": 4.3, "confidence": 2.5, "roundness": 2.3},
+        {"constant": -5.9, "protrusion": 5.3, "certainty": 1.6, "roundness": 2.1},
     ),
     "air": Question(
         "the branch at ({}) crosses air",

@@ -66,8 +66,8 @@ def limb_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[int, di
     """What speaks for every branch that leaves a junction and has an end: its leaf, and facts.
 
     The facts are: how far its points (all but a tenth) stand out of the surface around the other limbs, over its own
-    half width, as a logarithm, less the share of this that the object is beside it, too; its mean confidence; and how
-    round the part is at the junction.
+    half width, as a logarithm, less the share of this that the object is beside it, too; how certain it is, minus the
+    logarithm of what its mean confidence lacks of 1; and how round the part is at the junction.
     """
     return ((twig.tip, twig.facts) for twig in _twigs(skeleton, evidence))
 
@@ -111,7 +111,7 @@ def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
         out = np.clip(_standing_out(limbs, k, junction, points, ending), 0, FAR_OUT * own_half)
         facts = dict(
             protrusion=float(np.log(out / max(own_half, TINY) + LEAST_OUT) * (1 - shared)),
-            confidence=float(weights @ confidence[body]),
+            certainty=-float(np.log1p(-weights @ confidence[body])),
             roundness=float(roundness[junction]),
         )
         yield _Twig(junction, body, tip, facts)
