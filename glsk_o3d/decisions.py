@@ -45,7 +45,7 @@ QUESTIONS = {
         "spur pruned",
         "limb",
         False,
-        {"constant": -5.9, "protrusion": 5.3, "certainty": 1.6, "roundness": 2.1},
+        {"constant": -5.7, "protrusion": 5.2, "certainty": 1.3, "roundness": 2.2},
     ),
     "air": Question(
         "the branch at ({}) crosses air",
