@@ -61,7 +61,7 @@ def prepared(tmp_path_factory):
     folder = tmp_path_factory.mktemp("prepared")
     shape = samples.y_junction(1000)
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(shape.points))
-    for name in ("scan.ply", "horse.ply", "next.ply", "other.ply", "scans/a/left.pcd", "scans/b.ply"):
+    for name in ("demo/cloud.ply", "scan.ply", "horse.ply", "next.ply", "other.ply", "scans/a/left.pcd", "scans/b.ply"):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         assert o3d.io.write_point_cloud(str(folder / name), cloud)
     (folder / "list.txt").write_text("scan.ply\n")
