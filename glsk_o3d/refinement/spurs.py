@@ -21,6 +21,7 @@ SPUR_POINTS = 128  # speed: of a branch that are enough to say how far it reache
 SPUR_QUANTILE = 0.9  # fitted: share of a spur's points that its reach covers
 FAR_OUT = 20.0  # fitted: half widths beyond which a protrusion says no more; of no half width none count
 LEAST_OUT = 0.3  # fitted: half widths below which a protrusion says no more
+LONG_OUTSIDE = 4.0  # derived: half widths of a part that is twice as long as it is wide
 BESIDE = 2.0  # fitted: half widths from the curve to where nothing is beside a limb
 OUTER_PLACES = np.linspace(1 / 3, 1, 5)  # measured: of the length; each but the first and last is asked
 ACROSS = 16  # precision: directions across a branch; eight are enough for flat parts
@@ -100,21 +101,33 @@ def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
     for branch in limbs.branches:
         if 1 in degree[branch[[0, -1]]]:
             ending[branch] = degree[branch] < 3
-    share = [count[path[1:]] / count[path[1:]].sum() for _, path in found]
-    half = np.array([weights @ wide[path[1:]] for weights, (_, path) in zip(share, found, strict=True)])
+    surface = cloud.distance
+    outside = [_outside(skeleton.vertices, path, surface[path[0]], wide) for _, path in found]
+    half = np.array([count[part] @ wide[part] / count[part].sum() for part in outside])
     beside = _beside(evidence, skeleton.vertices, sections.across, [path for _, path in found], half)
-    for (k, path), weights, own_half, shared in zip(found, share, half, beside, strict=True):
+    for (k, path), part, own_half, shared in zip(found, outside, half, beside, strict=True):
         junction, body, tip = int(path[0]), path[1:], int(path[-1])
-        own = cloud.points[cloud.members.of(body)]
+        own = cloud.points[cloud.members.of(part)]
         # by how far they are, and not as they come, which depends on how the object is turned
         points = own[np.argsort(norm(own - skeleton.vertices[junction]))][:: len(own) // SPUR_POINTS + 1]
         out = np.clip(_standing_out(limbs, k, junction, points, ending), 0, FAR_OUT * own_half)
         facts = dict(
             protrusion=float(np.log(out / max(own_half, TINY) + LEAST_OUT) * (1 - shared)),
-            certainty=-float(np.log1p(-weights @ confidence[body])),
+            certainty=-float(np.log1p(-count[body] @ confidence[body] / count[body].sum())),
             roundness=float(roundness[junction]),
         )
         yield _Twig(junction, body, tip, facts)
+
+
+def _outside(vertices: np.ndarray, path: np.ndarray, surface: float, wide: np.ndarray) -> np.ndarray:
+    """The part of a branch that is farther from its junction than the surface there, if it is long; else all of it.
+
+    The curve of a spout or a leg begins at the axis of the body, and up to its surface the points are the body's.
+    """
+    body = path[1:]
+    away = norm(vertices[body] - vertices[path[0]])
+    part = body[np.flatnonzero(away <= surface).max(initial=-1) + 1 :]
+    return part if len(part) and away[-1] - surface > LONG_OUTSIDE * np.median(wide[part]) else body
 
 
 def _with_forks(skeleton: Skeleton, twigs: list[_Twig]) -> list[_Twig]:

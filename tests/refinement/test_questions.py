@@ -9,7 +9,7 @@ from glsk_o3d import Connector, Contractor, LPRReducer, Report, pipelines, sampl
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
 from glsk_o3d.numerics.winding import AREA_NEIGHBOURS, point_areas
 from glsk_o3d.refinement.evidence import Evidence
-from glsk_o3d.refinement.spurs import _beside
+from glsk_o3d.refinement.spurs import _beside, _outside
 from glsk_o3d.samples.capsules import union_sample
 
 X, Y, Z = np.eye(3)
@@ -122,6 +122,25 @@ def test_limbs_do_not_depend_on_how_the_object_is_turned(refine, placed):
     assert len(again[0]) > 4
     sure, also = (sorted(each.probability for each in decisions) for decisions in again)
     np.testing.assert_allclose(sure, also, atol=1e-6)
+
+
+def test_a_long_limb_is_judged_by_what_is_outside_of_its_body():
+    path, half = np.arange(11)[::-1], np.full(11, 0.1)
+    vertices = np.arange(11)[::-1, None] / 10 * Z  # from the junction, vertex 10, a tenth each
+    np.testing.assert_array_equal(_outside(vertices, path, 0.45, half), [5, 4, 3, 2, 1, 0])
+    np.testing.assert_array_equal(_outside(vertices, path, 0.65, half), path[1:])  # not twice as long as wide
+    np.testing.assert_array_equal(_outside(vertices, path, 1.5, half), path[1:])
+    np.testing.assert_array_equal(_outside(vertices, path, 0.0, half), path[1:])
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_thin_spout_of_a_thick_body_is_a_limb(seed):
+    """Up to the surface the points around its curve are the body's, ten times as wide."""
+    nodes = np.array([[-0.7, 0, 0], [0.7, 0, 0], [0, 0, 0], [0.2, 0, 0.8]])
+    body = union_sample("", nodes, np.array([[0, 1], [2, 3]]), np.array([0.4, 0.4, 0.04, 0.04]), 4000, 0.0, seed)
+    skeleton = skeletonize(body.points)
+    assert counts(skeleton) == (1, 0, 3)
+    assert min(it.probability for it in skeleton.report.decisions if it.about == "limb") > 0.9
 
 
 def twig(piped, reach, around=None):
