@@ -37,7 +37,7 @@ QUESTIONS = {
         "loop closed",
         "handle",
         False,
-        {"constant": -0.9, "opening": 2.9, "winding": -3.3, "bonds": 0.5, "confidence": 3.0},
+        dict(constant=-0.9, opening=2.9, winding=-3.3, bonds=0.5, confidence=3.0),
     ),
     "limb": Question(
         "the branch at ({}) is a limb",
@@ -45,7 +45,7 @@ QUESTIONS = {
         "spur pruned",
         "limb",
         False,
-        {"constant": -5.7, "protrusion": 5.2, "certainty": 1.3, "roundness": 2.2},
+        dict(constant=-5.7, protrusion=5.2, certainty=1.3, roundness=2.2),
     ),
     "air": Question(
         "the branch at ({}) crosses air",
@@ -53,16 +53,9 @@ QUESTIONS = {
         "branch cut",
         "air",
         True,
-        {
-            "constant": -5.8,
-            "deficit": 1.7,
-            "surface": -0.5,
-            "straightness": -3.2,
-            "noise": 1.9,
-            "bonds": -0.9,
-            "inner": 3.4,
-            "length": -0.5,
-        },
+        dict(
+            constant=-5.8, deficit=1.7, surface=-0.5, straightness=-3.2, noise=1.9, bonds=-0.9, inner=3.4, length=-0.5
+        ),
     ),
     "gap": Question(
         "the object goes on across the gap at ({})",
@@ -70,7 +63,7 @@ QUESTIONS = {
         "gap bridged",
         "bridge",
         True,
-        {"constant": -1.7, "winding": 3.7, "cap": -1.2},
+        dict(constant=-1.7, winding=3.7, cap=-1.2),
     ),
 }
 """What is asked about loops, about branches that leave a junction, about branches, and about ends, in this order."""

@@ -15,7 +15,7 @@ architecture = importlib.import_module("architecture")
 sys.path.pop(0)
 
 LONG_FUNCTIONS = {
-    "numerics/delaunay_star.py:delaunay_star": "one loop over all hulls at once, whose steps share a dozen arrays",
+    "numerics/delaunay_star.py:delaunay_star": "one loop over all hulls at once, whose steps share a dozen arrays"
 }
 """Functions of more than 50 lines of code, and why: at most three."""
 

@@ -5,12 +5,7 @@ import open3d as o3d
 import pytest
 from scipy.spatial import cKDTree
 
-from glsk_o3d import (
-    InvalidCloudError,
-    InvalidParameterError,
-    remove_redundant_points,
-    samples,
-)
+from glsk_o3d import InvalidCloudError, InvalidParameterError, remove_redundant_points, samples
 
 POINTS = samples.y_junction(1500).points
 _, KEPT = remove_redundant_points(POINTS)

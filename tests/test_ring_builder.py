@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay, cKDTree
 
-from glsk_o3d import (
-    Contraction,
-    InvalidParameterError,
-    RingBuilder,
-    samples,
-)
+from glsk_o3d import Contraction, InvalidParameterError, RingBuilder, samples
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
 from glsk_o3d.ring_builder import default_k, published_k
 

@@ -38,8 +38,7 @@ def root_option(help: str) -> Any:
 
 SkeletonFile = Annotated[Path, argument("SKELETON", "A skeleton in a file: json, npz, ply, obj or swc.")]
 ScanFile = Annotated[
-    Path,
-    argument("SCAN", "A cloud: ply, pcd, csv, txt, asc, xyz, las, laz, e57; or a mesh: obj, stl."),
+    Path, argument("SCAN", "A cloud: ply, pcd, csv, txt, asc, xyz, las, laz, e57; or a mesh: obj, stl.")
 ]
 Where = Annotated[
     str | None, option("CONDITION", "Take only points such as 'classification == 5'; 'glsk info' says what a file has.")
@@ -47,8 +46,7 @@ Where = Annotated[
 DropInvalid = Annotated[bool, Option("--drop-invalid", help="Drop points with NaN or infinite coordinates.")]
 
 PipelineName = Annotated[
-    str,
-    option("NAME|FILE", "default, tree, wen2024, cao2010, a plugin's, or a recipe or a result in json."),
+    str, option("NAME|FILE", "default, tree, wen2024, cao2010, a plugin's, or a recipe or a result in json.")
 ]
 Settings = Annotated[
     list[str] | None,

@@ -16,8 +16,7 @@ def run(
     script: Annotated[str | None, argument("SCRIPT", "A filter script (.mlx), or the name of one in --list.")] = None,
     scan: Annotated[Path | None, argument("SCAN", "The cloud or mesh it starts from.")] = None,
     output: Annotated[
-        list[Path] | None,
-        output_option("FILE", "The last layer: a skeleton, points or a mesh (ply, xyz)."),
+        list[Path] | None, output_option("FILE", "The last layer: a skeleton, points or a mesh (ply, xyz).")
     ] = None,
     listed: Annotated[bool, Option("--list", help="List the scripts that come with the package.")] = False,
     cut_loops: CutLoops = False,

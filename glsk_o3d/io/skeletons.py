@@ -43,11 +43,7 @@ _HOLDS_LINES = {".ply": ply.holds_lines, ".obj": lines.holds_lines}  # formats t
 
 
 def save_skeleton(
-    skeleton: Skeleton,
-    path: str | os.PathLike[str],
-    *,
-    cut_loops: bool = False,
-    root: RootPlace | None = None,
+    skeleton: Skeleton, path: str | os.PathLike[str], *, cut_loops: bool = False, root: RootPlace | None = None
 ) -> None:
     """Write a skeleton to a file; the ending chooses the format.
 

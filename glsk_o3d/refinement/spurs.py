@@ -66,9 +66,10 @@ def prune_spurs(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
 def limb_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[int, dict[str, float]]]:
     """What speaks for every branch that leaves a junction and has an end: its leaf, and facts.
 
-    The facts are: how far its points (all but a tenth) stand out of the surface around the other limbs, over its own
-    half width, as a logarithm, less the share of this that the object is beside it, too; how certain it is, minus the
-    logarithm of what its mean confidence lacks of 1; and how round the part is at the junction.
+    The facts are: how far its points (all but a tenth, and of a long limb those outside of its body) stand out of the
+    surface around the other limbs, over its own half width, as a logarithm, less the share of this that the object is
+    beside it, too; how certain it is, minus the logarithm of what its mean confidence lacks of 1; and how round the
+    part is at the junction.
     """
     return ((twig.tip, twig.facts) for twig in _twigs(skeleton, evidence))
 

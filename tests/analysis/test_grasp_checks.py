@@ -6,13 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from glsk_o3d import (
-    InvalidCloudError,
-    InvalidParameterError,
-    Skeleton,
-    SkeletonWarning,
-    samples,
-)
+from glsk_o3d import InvalidCloudError, InvalidParameterError, Skeleton, SkeletonWarning, samples
 from glsk_o3d.analysis import Gripper, grasp_candidates, grasp_checks
 
 HAND = Gripper(0.4, finger=(0.05, 0.06, 0.3), palm=(0.5, 0.1, 0.2), reach=0.05)
@@ -54,8 +48,7 @@ WALL = sheet((-1, 1), 0.3, (-1.5, 1.5), 0.02)
 
 
 @pytest.mark.parametrize(
-    ("points", "plane", "why"),
-    [((), (0, 1, 0, -0.3), BEHIND), ((), (0, -10, 0, 3.0), BEHIND), (WALL, None, TOUCHING)],
+    ("points", "plane", "why"), [((), (0, 1, 0, -0.3), BEHIND), ((), (0, -10, 0, 3.0), BEHIND), (WALL, None, TOUCHING)]
 )
 def test_a_wall_keeps_away_exactly_what_comes_from_its_side(points, plane, why):
     free, beside = grasp(rod()), grasp(rod(points), plane=plane)

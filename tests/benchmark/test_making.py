@@ -127,13 +127,7 @@ def test_a_folder_without_an_index(tmp_path):
         read_folder(tmp_path)
 
 
-@pytest.mark.parametrize(
-    ("part", "name"),
-    [
-        ("file", "../secret.ply"),
-        ("truth", "truth/../x.npz"),
-    ],
-)
+@pytest.mark.parametrize(("part", "name"), [("file", "../secret.ply"), ("truth", "truth/../x.npz")])
 def test_an_index_leads_nowhere_else(small, part, name):
     told = json.loads((small.path / INDEX_NAME).read_text())
     tube = told["shapes"]["tubes_100"]

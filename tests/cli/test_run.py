@@ -73,10 +73,7 @@ def test_what_meshlab_cannot_do(refused, script, tmp_path, scans, y):
     for words, message in (
         ("scan_cleanup torn.ply -o c.ply", "torn.ply: not a valid .ply file: it promises 1100 points"),
         ("scan_cleanup a.zzz -o c.ply", "a.zzz: "),
-        (
-            f"{wrong_layer} {scans}/sample.ply",
-            "s.mlx, line 2: filter 'Hausdorff Distance': sampledmesh = 9: ",
-        ),
+        (f"{wrong_layer} {scans}/sample.ply", "s.mlx, line 2: filter 'Hausdorff Distance': sampledmesh = 9: "),
     ):
         assert message in refused(1, "run", *words.split())
 

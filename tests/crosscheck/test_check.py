@@ -50,11 +50,7 @@ def test_it_tells_where_the_cloud_is_noisy():
 
 @SPIKY
 @pytest.mark.parametrize(
-    ("verdict", "shape", "n", "noise"),
-    [
-        ("do not trust", "sheet", 1024, 0),
-        ("cannot tell", "torus", 1024, 0.08),
-    ],
+    ("verdict", "shape", "n", "noise"), [("do not trust", "sheet", 1024, 0), ("cannot tell", "torus", 1024, 0.08)]
 )
 def test_too_sparse_too_noisy_or_without_a_curve(verdict, shape, n, noise):
     assert cross_check(samples.SAMPLES[shape](n, noise=noise).points).verdict == verdict

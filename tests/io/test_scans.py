@@ -212,11 +212,7 @@ def stl(folder):
     return folder / "m.stl"
 
 
-OTHERS = {
-    "STL": stl,
-    "PLY text": open3d("c.ply", write_ascii=True),
-    "PCD compressed": open3d("c.pcd", compressed=True),
-}
+OTHERS = {"STL": stl, "PLY text": open3d("c.ply", write_ascii=True), "PCD compressed": open3d("c.pcd", compressed=True)}
 
 
 @pytest.mark.parametrize("name", [*FILES, *OTHERS])

@@ -6,15 +6,7 @@ import numpy as np
 import open3d as o3d
 import pytest
 
-from glsk_o3d import (
-    annotate,
-    annotate_file,
-    pipelines,
-    read_cloud,
-    read_sample,
-    read_tensor_cloud,
-    skeletonize,
-)
+from glsk_o3d import annotate, annotate_file, pipelines, read_cloud, read_sample, read_tensor_cloud, skeletonize
 from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from glsk_o3d.io import streaming
 from glsk_o3d.io.formats import ply

@@ -10,13 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.distance import cdist
 
-from glsk_o3d.numerics.neighbourhoods import (
-    nearest_left,
-    nearest_neighbours,
-    plane_axes,
-    principal,
-    scatter,
-)
+from glsk_o3d.numerics.neighbourhoods import nearest_left, nearest_neighbours, plane_axes, principal, scatter
 from glsk_o3d.numerics.vectors import PAIRS
 
 RNG = np.random.default_rng(0)

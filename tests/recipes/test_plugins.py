@@ -172,10 +172,7 @@ BROKEN_FILTERS = [
     ("@dataclass\nclass Thing(Filter): _run = print", NO_FILTER),
     ("@dataclass(frozen=True)\nclass Other(Filter): _run = print\nThing = Other", "the name of the class, 'Other'"),
     (FROZEN.format("Filter", "a: int = 3", "_run = print"), "its field 'a' is not made by glsk_o3d.parameters"),
-    (
-        field("3, 'A.', type='int'").replace("a:", "rule:"),
-        "its field 'rule' is not made by",
-    ),
+    (field("3, 'A.', type='int'").replace("a:", "rule:"), "its field 'rule' is not made by"),
     (field("3, 'A.', type='int', low=4"), "InvalidParameterError: Thing.a = 3: must be at least 4"),
     (FROZEN.format("Filter", "consumes = 'mesh'", "_run = print"), "there is no filter from mesh to "),
     (FROZEN.format("Filter", "consumes, produces = Skeleton, Cloud", "_run = print"), "there is no filter from "),

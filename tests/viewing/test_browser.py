@@ -141,11 +141,7 @@ def test_fits_the_screen_in_light_and_dark(report, look, pixels, width):
 
 def test_texts_are_texts(run, look, tmp_path):
     recorded = dataclasses.replace(
-        run.report,
-        warnings=(HOSTILE,),
-        stop_reason=HOSTILE,
-        recipe={HOSTILE: HOSTILE},
-        versions={HOSTILE: HOSTILE},
+        run.report, warnings=(HOSTILE,), stop_reason=HOSTILE, recipe={HOSTILE: HOSTILE}, versions={HOSTILE: HOSTILE}
     )
     glsk.save_report(dataclasses.replace(run, report=recorded), tmp_path / "r.html", title=HOSTILE)
     page = look(tmp_path / "r.html")
