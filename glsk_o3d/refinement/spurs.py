@@ -104,7 +104,7 @@ def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
             ending[branch] = degree[branch] < 3
     surface = cloud.distance
     outside = [_outside(skeleton.vertices, path, surface[path[0]], wide) for _, path in found]
-    half = np.array([count[part] @ wide[part] / count[part].sum() for part in outside])
+    half = np.array([np.average(wide[part], weights=count[part]) for part in outside])
     beside = _beside(evidence, skeleton.vertices, sections.across, [path for _, path in found], half)
     for (k, path), part, own_half, shared in zip(found, outside, half, beside, strict=True):
         junction, body, tip = int(path[0]), path[1:], int(path[-1])
@@ -114,7 +114,7 @@ def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
         out = np.clip(_standing_out(limbs, k, junction, points, ending), 0, FAR_OUT * own_half)
         facts = dict(
             protrusion=float(np.log(out / max(own_half, TINY) + LEAST_OUT) * (1 - shared)),
-            certainty=-float(np.log1p(-count[body] @ confidence[body] / count[body].sum())),
+            certainty=-float(np.log1p(-np.average(confidence[body], weights=count[body]))),
             roundness=float(roundness[junction]),
         )
         yield _Twig(junction, body, tip, facts)
