@@ -63,8 +63,7 @@ def _asked(refiner: Refiner, raw: Skeleton, truth: Truth) -> Iterator[tuple[str,
     if cycles:
         placed = Placed(truth, skeleton.vertices)
         for cycle, loop in zip(cycles, loop_facts(skeleton, cycles, evidence), strict=True):
-            if (is_so := placed.is_handle(cycle)) is not None:  # also without an inside: of false ones there are few
-                yield "loop", loop.facts, is_so
+            yield "loop", loop.facts, placed.is_handle(cycle)  # also without an inside: of false ones there are few
     skeleton, _ = refiner._asked("loop", skeleton, evidence)
     yield from _limbs(skeleton, evidence, truth)
     skeleton, _ = refiner._asked("limb", skeleton, evidence)
@@ -118,13 +117,13 @@ class Placed:
         there = branch[max(k - NEAR, 0) : k + NEAR + 2]
         return bool(self.apart(there[:-1], there[1:]).any())
 
-    def is_handle(self, cycle: np.ndarray) -> bool | None:
+    def is_handle(self, cycle: np.ndarray) -> bool:
         """Whether the walk along the true axis that follows a loop goes round a loop of it, and not only to and fro.
 
-        None where the loop crosses air: it is no handle, but to zip it up would join what is apart.
+        A loop that crosses air is none.
         """
         if self.apart(cycle, np.roll(cycle, -1)).any():
-            return None
+            return False
         flow: dict[tuple[int, int], int] = {}
         for a, b in zip(cycle.tolist(), np.roll(cycle, -1).tolist(), strict=True):
             start, here = int(self.place[a]), int(self.place[b])

@@ -37,7 +37,7 @@ QUESTIONS = {
         "loop closed",
         "handle",
         False,
-        dict(constant=-0.9, opening=2.9, winding=-3.3, bonds=0.5, confidence=3.0),
+        dict(constant=-4.4, opening=2.6, sight=1.5, fall=2.9, bonds=0.9),
     ),
     "limb": Question(
         "the branch at ({}) is a limb",

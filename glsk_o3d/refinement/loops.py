@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from ..decisions import QUESTIONS, Decision
 from ..numerics.cycles import inscribed_circle, minimum_cycle_basis
@@ -15,9 +16,9 @@ from .merging import collapse_triangles, drop_edges, merge_vertices
 from .sections import VertexPoints
 
 WIDE_LOOP = 1.5  # fitted: opening of a loop that is more than two strands in one part
-WIDE_OPEN = 3.0  # fitted: opening beyond which it says no more: sparse crowns have wide false loops
-HOLE_SHARE = 0.6  # fitted: of the largest circle in a loop, the part of it that is asked
-DIRECTIONS = np.column_stack([f(np.arange(6) * np.pi / 3) for f in (np.cos, np.sin)])  # derived: six, evenly
+WIDE_OPEN = 3.0  # fitted: opening, and sight in spacings, beyond which they say no more: crowns have wide false loops
+RINGS = [(k / 4, np.arange(6 * k) * np.pi / (3 * k)) for k in range(1, 5)]  # derived: of places, as far from each other
+VIEWS = np.vstack([[0, 0], *(r * np.column_stack([np.cos(a), np.sin(a)]) for r, a in RINGS)])
 
 
 def _collapsed(skeleton: Skeleton, cycles: list[np.ndarray]) -> Skeleton:
@@ -72,53 +73,52 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
     """What speaks for and against that each of some loops is a handle.
 
     The facts are: how wide it opens, the radius of the largest circle inside it over the distance of the surface, as a
-    logarithm; the least winding number in that circle, over the median along the loop, since a handle is one if no disc
-    that spans it stays inside; the least bonds that cross it somewhere, over their median, as a logarithm; and the mean
-    confidence.
+    logarithm; how well one sees through it, the radius in spacings of the points of the widest empty cylinder that
+    stands on a place in that circle, as long either way as the loop; by how much the winding number falls from the
+    median along the loop to that place, since a handle is one if no disc that spans it stays inside; and the least
+    bonds that cross it somewhere, over their median, as a logarithm.
     """
     if not cycles:
         return []
     surface = VertexPoints(skeleton).distance
     bonds = evidence.bonds(skeleton)
+    loops = [skeleton.vertices[cycle] for cycle in cycles]
+    views = [_view(loop, evidence) for loop in loops]
+    winding = evidence.winding(np.concatenate([[view.place for view in views], *loops]))
+    there, *along = np.split(winding, np.cumsum([len(cycles), *map(len, cycles[:-1])]))
     found = []
-    for cycle, hole in zip(cycles, _holes(skeleton, cycles, evidence), strict=True):
+    for cycle, view, outside, inside in zip(cycles, views, there, map(np.median, along), strict=True):
         tube = max(float(np.median(surface[cycle])), TINY)
         crossing = crossings(positions(cycle, len(surface)), len(cycle), bonds, closed=True)
         facts = dict(
-            opening=float(np.log(min(hole.radius, WIDE_OPEN * tube) / tube + 0.1)),
-            winding=float(np.clip(hole.share, 0, 1.5)),
+            opening=float(np.log(min(view.radius, WIDE_OPEN * tube) / tube + 0.1)),
+            sight=min(view.sight, WIDE_OPEN),
+            fall=float(inside - outside),
             bonds=float(np.log(crossing.min() / max(np.median(crossing), TINY) + 0.01)),
-            confidence=float(np.nan_to_num(skeleton.confidence[cycle]).mean()),
         )
-        found.append(LoopEvidence(facts, hole.inside, hole.centre, int(np.argmin(crossing))))
+        found.append(LoopEvidence(facts, float(inside), view.centre, int(np.argmin(crossing))))
     return found
 
 
-class _Hole(NamedTuple):
-    """The largest circle in a loop."""
+class _View(NamedTuple):
+    """Through a loop."""
 
-    centre: np.ndarray
+    centre: np.ndarray  # of the largest circle in it
     radius: float
-    inside: float  # median winding number along the loop
-    share: float  # the least winding number in the circle over that
+    place: np.ndarray  # in that circle, where one sees best
+    sight: float  # radius of the widest empty cylinder across it there, in spacings of the points
 
 
-def _holes(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> list[_Hole]:
-    circles, places = [], []
-    for cycle in cycles:
-        points = skeleton.vertices[cycle]
-        centre, radius = inscribed_circle(points)
-        axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][:2]
-        circles.append((centre, radius))
-        places.append(centre + HOLE_SHARE * radius * np.vstack([np.zeros(3), DIRECTIONS @ axes]))
-    around = np.unique(np.concatenate(cycles))
-    answers = evidence.winding(np.concatenate([*places, skeleton.vertices[around]]))
-    least = answers[: -len(around)].reshape(len(cycles), -1).min(axis=1)
-    winding = np.zeros(len(skeleton.vertices))
-    winding[around] = answers[-len(around) :]
-    inside = [float(np.median(winding[cycle])) for cycle in cycles]
-    shares = [float(hole) / max(along, LEAST_INSIDE) for hole, along in zip(least, inside, strict=True)]
-    return [_Hole(*circle, *facts) for circle, *facts in zip(circles, inside, shares, strict=True)]
+def _view(loop: np.ndarray, evidence: Evidence) -> _View:
+    centre, radius = inscribed_circle(loop)
+    axes = np.linalg.svd(loop - loop.mean(axis=0), full_matrices=False)[2]
+    spacing = max(float(np.sqrt(np.median(evidence.areas))), TINY)
+    reach = np.array([*2 * [radius + WIDE_OPEN * spacing], arc_lengths(loop)[-1]])
+    points = (evidence.points - centre) @ axes.T
+    points = points[(np.abs(points) < reach).all(axis=1)]
+    empty = cdist(radius * VIEWS, points[:, :2]).min(axis=1, initial=np.inf)
+    best = np.argmax(empty)
+    return _View(centre, radius, centre + radius * VIEWS[best] @ axes[:2], float(empty[best] / spacing))
 
 
 def crossings(place: np.ndarray, n: int, bonds: tuple[np.ndarray, np.ndarray], closed: bool) -> np.ndarray:

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from glsk_o3d import Connector, Contractor, LPRReducer, Report, pipelines, samples, skeletonize
+from glsk_o3d.numerics.cycles import minimum_cycle_basis
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
 from glsk_o3d.numerics.winding import AREA_NEIGHBOURS, point_areas
 from glsk_o3d.refinement.evidence import Evidence
+from glsk_o3d.refinement.loops import WIDE_OPEN, loop_facts
 from glsk_o3d.refinement.spurs import _beside, _outside
 from glsk_o3d.samples.capsules import union_sample
 
@@ -55,6 +57,20 @@ def strands(piped, gap, length, **options):
     a, b = length / 2, length / 2 - 0.05
     middle = [[(-a, 0, 0), (-b, y, 0), (b, y, 0), (a, 0, 0)] for y in (-gap / 2, gap / 2)]
     return piped([*middle, [(-1, 0, 0), (-a, 0, 0)], [(a, 0, 0), (1, 0, 0)]], around=TUBE, **options)
+
+
+@pytest.mark.parametrize(("height", "clear"), [(None, True), (0.6, False), (20.0, True)])
+def test_one_sees_through_a_loop_if_no_surface_is_as_near_as_it_is_long(piped, height, clear):
+    ring = piped(TORUS)
+    if height is not None:  # a sheet across it
+        x, y = np.mgrid[-1:1:41j, -1:1:41j]
+        sheet = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, height)])
+        points, normals = np.vstack([ring.points, sheet]), np.vstack([ring.normals, np.tile(Z, (len(sheet), 1))])
+        owner = np.concatenate([ring.vertex_of_point, np.zeros(len(sheet), int)])
+        ring = replace(ring, points=points, normals=normals, vertex_of_point=owner)
+    cycles = minimum_cycle_basis(len(ring.vertices), ring.edges, ring.edge_lengths)
+    (loop,) = loop_facts(ring, cycles, evidence_of(ring.points, ring.normals))
+    assert (loop.facts["sight"] == WIDE_OPEN) if clear else (loop.facts["sight"] < 1)
 
 
 @SIDES
