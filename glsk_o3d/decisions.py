@@ -37,7 +37,7 @@ QUESTIONS = {
         "loop closed",
         "handle",
         False,
-        dict(constant=-4.4, opening=2.6, sight=1.5, fall=2.9, bonds=0.9),
+        dict(constant=-4.3, opening=2.6, sight=1.4, fall=2.7, bonds=1.0),
     ),
     "limb": Question(
         "the branch at ({}) is a limb",

@@ -74,26 +74,26 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
 
     The facts are: how wide it opens, the radius of the largest circle inside it over the distance of the surface, as a
     logarithm; how well one sees through it, the radius in spacings of the points of the widest empty cylinder that
-    stands on a place in that circle, as long either way as the loop; by how much the winding number falls from the
-    median along the loop to that place, since a handle is one if no disc that spans it stays inside; and the least
-    bonds that cross it somewhere, over their median, as a logarithm.
+    stands on a place in that circle, as long either way as both together; the share by which the winding number falls
+    from the median along the loop to that place, since a handle is one if no disc that spans it stays inside; and the
+    least bonds that cross it somewhere, over their median, as a logarithm.
     """
     if not cycles:
         return []
     surface = VertexPoints(skeleton).distance
+    tubes = [max(float(np.median(surface[cycle])), TINY) for cycle in cycles]
     bonds = evidence.bonds(skeleton)
     loops = [skeleton.vertices[cycle] for cycle in cycles]
-    views = [_view(loop, evidence) for loop in loops]
+    views = [_view(loop, tube, evidence) for loop, tube in zip(loops, tubes, strict=True)]
     winding = evidence.winding(np.concatenate([[view.place for view in views], *loops]))
     there, *along = np.split(winding, np.cumsum([len(cycles), *map(len, cycles[:-1])]))
     found = []
-    for cycle, view, outside, inside in zip(cycles, views, there, map(np.median, along), strict=True):
-        tube = max(float(np.median(surface[cycle])), TINY)
+    for cycle, tube, view, outside, inside in zip(cycles, tubes, views, there, map(np.median, along), strict=True):
         crossing = crossings(positions(cycle, len(surface)), len(cycle), bonds, closed=True)
         facts = dict(
             opening=float(np.log(min(view.radius, WIDE_OPEN * tube) / tube + 0.1)),
             sight=min(view.sight, WIDE_OPEN),
-            fall=float(inside - outside),
+            fall=float(1 - outside / max(inside, LEAST_INSIDE)),
             bonds=float(np.log(crossing.min() / max(np.median(crossing), TINY) + 0.01)),
         )
         found.append(LoopEvidence(facts, float(inside), view.centre, int(np.argmin(crossing))))
@@ -109,11 +109,11 @@ class _View(NamedTuple):
     sight: float  # radius of the widest empty cylinder across it there, in spacings of the points
 
 
-def _view(loop: np.ndarray, evidence: Evidence) -> _View:
+def _view(loop: np.ndarray, tube: float, evidence: Evidence) -> _View:
     centre, radius = inscribed_circle(loop)
     axes = np.linalg.svd(loop - loop.mean(axis=0), full_matrices=False)[2]
     spacing = max(float(np.sqrt(np.median(evidence.areas))), TINY)
-    reach = np.array([*2 * [radius + WIDE_OPEN * spacing], arc_lengths(loop)[-1]])
+    reach = np.array([*2 * [radius + WIDE_OPEN * spacing], radius + tube])
     points = (evidence.points - centre) @ axes.T
     points = points[(np.abs(points) < reach).all(axis=1)]
     empty = cdist(radius * VIEWS, points[:, :2]).min(axis=1, initial=np.inf)
