@@ -24,9 +24,9 @@ print(f"{len(cloud)} points, {2**6} tips")
 with warnings.catch_warnings():
     warnings.simplefilter(
         "ignore", glsk.SkeletonWarning
-    )  # it says that the crown is weakly supported
+    )  # it says that the crown is weakly supported, and which loops in it were close calls
     before = glsk.pipelines.default().with_options({"Tracer.surface": 0})(cloud)
-tree = glsk.pipelines.tree()(cloud)
+    tree = glsk.pipelines.tree()(cloud)
 print(before)
 print(
     tree,
