@@ -62,7 +62,6 @@ def branch_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[np.nd
     tubes = 2 * np.pi * np.maximum(skeleton.radii[edges].mean(axis=1), TINY) @ length
     area = along.sum()
     seen = max(area / max(tubes, area * TINY, TINY), TINY)  # a line has no tubes
-    spacing = np.sqrt(np.median(evidence.areas))
     bonds = evidence.bonds(skeleton)
     around, keys = _neighbours(skeleton), edges @ [m, 1]
 
@@ -88,7 +87,7 @@ def branch_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[np.nd
             surface=np.log(max(surface / seen, 0) + 0.05),
             straightness=_straightness(vertices, around, branch, k, radius),
             noise=skeleton.report.noise,
-            bonds=np.log(float(bonded.min()) / 2 * spacing / (2 * np.pi * radius) + 0.05),
+            bonds=np.log(float(bonded.min()) / 2 * evidence.spacing / (2 * np.pi * radius) + 0.05),
             inner=float((skeleton.degree[branch[[0, -1]]] > 1).all()),
             length=np.log(ends[-1] / radius + 0.1),
         )

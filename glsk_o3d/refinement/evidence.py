@@ -80,6 +80,11 @@ class Evidence(SurfaceGraph):
         vars(made)["diffusion"] = surface.diffusion  # over the same links
         return made
 
+    @cached_property
+    def spacing(self) -> float:
+        """Distance of the points: the root of the median of what they stand for."""
+        return float(np.sqrt(np.median(self.areas)))
+
     def winding(self, queries: np.ndarray) -> np.ndarray:
         """Winding number of the surface around each place, (m,) float array from (m, 3): near 1 inside, 0 outside."""
         return winding_number(self.points, self.normals, self.areas, queries)

@@ -17,13 +17,8 @@ from .sections import VertexPoints
 
 WIDE_LOOP = 1.5  # fitted: opening of a loop that is more than two strands in one part
 WIDE_OPEN = 3.0  # fitted: opening, and sight in spacings, beyond which they say no more: crowns have wide false loops
-RINGS = [(k / 4, np.arange(6 * k) * np.pi / (3 * k)) for k in range(1, 5)]  # derived: of places, as far from each other
+RINGS = [(k / 4, np.arange(6 * k) * np.pi / (3 * k)) for k in range(1, 5)]  # derived: evenly spaced places in a circle
 VIEWS = np.vstack([[0, 0], *(r * np.column_stack([np.cos(a), np.sin(a)]) for r, a in RINGS)])
-
-
-def _collapsed(skeleton: Skeleton, cycles: list[np.ndarray]) -> Skeleton:
-    pairs = np.concatenate([facing_pairs(skeleton.vertices[cycle], cycle) for cycle in cycles])
-    return collapse_triangles(merge_vertices(skeleton, component_labels(len(skeleton.vertices), pairs)))
 
 
 def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Decision]]:
@@ -52,7 +47,9 @@ def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
         if cut:
             skeleton = drop_edges(skeleton, cut)
         if narrow:
-            skeleton = _collapsed(skeleton, narrow)
+            pairs = np.concatenate([facing_pairs(skeleton.vertices[cycle], cycle) for cycle in narrow])
+            labels = component_labels(len(skeleton.vertices), pairs)
+            skeleton = collapse_triangles(merge_vertices(skeleton, labels))
 
 
 class LoopEvidence(NamedTuple):
@@ -112,13 +109,12 @@ class _View(NamedTuple):
 def _view(loop: np.ndarray, tube: float, evidence: Evidence) -> _View:
     centre, radius = inscribed_circle(loop)
     axes = np.linalg.svd(loop - loop.mean(axis=0), full_matrices=False)[2]
-    spacing = max(float(np.sqrt(np.median(evidence.areas))), TINY)
-    reach = np.array([*2 * [radius + WIDE_OPEN * spacing], radius + tube])
+    aside = radius + WIDE_OPEN * evidence.spacing
     points = (evidence.points - centre) @ axes.T
-    points = points[(np.abs(points) < reach).all(axis=1)]
-    empty = cdist(radius * VIEWS, points[:, :2]).min(axis=1, initial=np.inf)
-    best = np.argmax(empty)
-    return _View(centre, radius, centre + radius * VIEWS[best] @ axes[:2], float(empty[best] / spacing))
+    points = points[(np.abs(points) < [aside, aside, radius + tube]).all(axis=1)]
+    sight = cdist(radius * VIEWS, points[:, :2]).min(axis=1, initial=np.inf) / max(evidence.spacing, TINY)
+    best = np.argmax(sight)
+    return _View(centre, radius, centre + radius * VIEWS[best] @ axes[:2], float(sight[best]))
 
 
 def crossings(place: np.ndarray, n: int, bonds: tuple[np.ndarray, np.ndarray], closed: bool) -> np.ndarray:
