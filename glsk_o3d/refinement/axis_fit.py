@@ -27,6 +27,7 @@ FIT_STAY = 0.1  # fitted: weight of staying where it was, per point
 FIT_CENTROID = 0.5  # fitted: weight of the points themselves where their normals say nothing
 # derived: share of the squared normals of a quarter of a tube that stand across the others: of less, they do not say
 FIT_OPEN = 1 / 2 - 1 / np.pi  # how deep behind them the axis is; of half a tube it is .5
+FIT_SIDES = 30.0  # fitted: weight of the sides of a flat section; from 10 to 100 it is the same
 FIT_WALK = 3  # measured: vertices by which a point may move along the curve in a pass
 # derived: over the diagonal, how far out of the box of its points an axis may be: they show a third of a tube at least,
 FIT_BEYOND = 0.05  # whose axis is half a radius away from it, and a tube that is seen so is some ten radii long
@@ -72,7 +73,9 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
     as the part, whose points say more than their normals. Of a leaf seen from one side the normals hardly differ, and
     meet far behind it: e is the direction most of them have, a the share of their squares across it, and a_0 that of a
     quarter of a tube. An edge has the mean K of its two ends, and of it what is across the edge. Then
-    :math:`\Lambda` has the half thickness in place of w in its direction: a strap bends where it is thin.
+    :math:`\Lambda` has the half thickness in place of w in its direction: a strap bends where it is thin. And where both
+    sides of a flat section were seen, they say where the middle of its width is: the face of a plate that goes on into
+    another bar says it wrongly. See `_middle`.
 
     The confidence is (1 - d) c / (c + 8), where c counts over the vertex and its neighbours. The radii are those of
     circles with the area of the section, see `robust_radii`, or without passes `plane_distance_radii`. Points belong to
@@ -170,6 +173,7 @@ class _Nearest(NamedTuple):
     sections: Sections  # at every vertex
     width: np.ndarray  # half of the section's, at every vertex
     faces: np.ndarray  # (m, 6) different entries of the sum of n n^T, at every vertex and its neighbours
+    outward: np.ndarray  # (m, 6) sums of normals away from the curve, and of these times their planes' distances
 
 
 def _nearest(
@@ -183,7 +187,9 @@ def _nearest(
     a, b = ends.T
     aside = offset - dot(offset, along)[:, None] * along
     squares = aside[:, ROWS] * aside[:, COLUMNS]
-    facts = np.column_stack([miss, apart, np.full(len(p), 0.5), normal_moments(n, offset), squares])
+    depth = dot(n, offset)
+    outward = np.column_stack([-np.sign(depth)[:, None] * n, -depth[:, None] * n])
+    facts = np.column_stack([miss, apart, np.full(len(p), 0.5), normal_moments(n, offset), squares, outward])
     at = group_sum(facts, edge, len(ends))
     at = group_sum(np.concatenate([at, at]), np.concatenate([a, b]), len(x))
     at = at + group_sum(at[np.concatenate([b, a])], np.concatenate([a, b]), len(x))
@@ -193,9 +199,9 @@ def _nearest(
     # normals that point anywhere explain half of the distance; without points there is nothing but doubt
     doubt = np.where(apart_at > 0, np.minimum(2 * miss_at, apart_at) / np.maximum(apart_at, TINY), 1)
     # normals of a sheet as thin as its points are apart say nothing of its width, and there is nothing but doubt
-    spread = _spread_width(at[:, 15:] / np.maximum(support, TINY)[:, None])
+    spread = _spread_width(at[:, 15:21] / np.maximum(support, TINY)[:, None])
     width = sections.half_width + doubt * np.maximum(spread - sections.half_width, 0)
-    return _Nearest(edge, share, tangent, across, offset, doubt, support, sections, width, at[:, 3:9])
+    return _Nearest(edge, share, tangent, across, offset, doubt, support, sections, width, at[:, 3:9], at[:, 21:])
 
 
 def _pull(near: _Nearest) -> np.ndarray:
@@ -205,6 +211,23 @@ def _pull(near: _Nearest) -> np.ndarray:
     face = np.maximum(1 - across / FIT_OPEN, 0)[:, None] * axes[:, :, 2]
     pull: np.ndarray = FIT_CENTROID * near.doubt[:, None, None] * np.eye(3) + face[:, :, None] * axes[:, None, :, 2]
     return pull
+
+
+def _middle(near: _Nearest) -> tuple[np.ndarray, np.ndarray]:
+    r"""How firmly both sides of a flat section say where its middle is, (m,); and how far along the width it is, (m,).
+
+    With outward normals n, distances h of their planes from the curve, and the direction e and half width w of the
+    width, the sides +e and -e have :math:`c \pm r` normals whose planes are :math:`(w c \pm q) / (c \pm r)` away, where
+    :math:`c = \sum (n \cdot e)^2, r = \sum n \cdot e, q = \sum h\, n \cdot e`. Half the difference is the way to the
+    middle. It counts by what both sides have, c - |r|, by how flat the section is, and by (1 - d)^2.
+    """
+    width, thickness, across = near.sections
+    seen = np.einsum("mi,mij,mj->m", across, near.faces[:, FULL], across)
+    odd, distant = dot(near.outward[:, :3], across), dot(near.outward[:, 3:], across)
+    both = np.maximum(seen - np.abs(odd), 0)
+    way = seen * (distant - width * odd) / np.maximum(both * (seen + np.abs(odd)), TINY)
+    flat = (1 - thickness / np.maximum(width, TINY)) * (1 - near.doubt) ** 2
+    return flat * both, np.clip(way, -width, width)
 
 
 def _spread_width(moments: np.ndarray) -> np.ndarray:
@@ -241,6 +264,12 @@ def _solve(x: np.ndarray, near: _Nearest, p: np.ndarray, pattern: _Pattern, sett
     along = facts[:, 4:].reshape(m, 3, 3) / np.maximum(np.bincount(ends.ravel(), minlength=m), 1)[:, None, None]
     stay = (FIT_STAY * count + 1e-3 * max(count.mean(), 1))[:, None, None] * np.eye(3) + count[:, None, None] * along
     right = right + np.einsum("nij,nj->ni", stay, x)
+    if settle:
+        firm, way = _middle(near)
+        across = near.sections.across
+        sides = FIT_SIDES * firm[:, None, None] * across[:, :, None] * across[:, None]
+        stay = stay + sides
+        right = right + np.einsum("nij,nj->ni", sides, x + way[:, None] * across)
 
     reach = np.linalg.norm(x[beside] - x[inner, None], axis=2)
     chord = reach[:, ::-1] / np.maximum(reach.sum(axis=1, keepdims=True), TINY)

@@ -20,7 +20,7 @@ LINE_STEP = 0.1  # derived: radii from one place on a limb to the next that is a
 LINE_STEPS = 400  # derived: places at most
 SURFACE_WEIGHT = 12.0  # of the surface that fits a sphere, over that of a line that says exactly where it is
 SURFACE_FIT = 0.25  # distance from the sphere, over the radius, at which a point counts half
-MEETING_HOLD = 0.02  # weight of where the junction was: a straight tube says nothing of where along it
+MEETING_HOLD = 0.2  # weight of where the junction was: a straight tube says nothing of where along it
 MEETING_ROUNDS = 10  # precision: from then on hardly anything moves
 
 

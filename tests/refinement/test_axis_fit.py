@@ -129,6 +129,14 @@ def test_the_curve_of_a_flat_bar_is_its_midline(wiggle):
     assert np.abs(moved[:, 2]).max() < 0.02
 
 
+def test_the_sides_say_where_the_middle_is_if_half_of_the_faces_belongs_to_another_bar():
+    bar = strip()
+    own = (np.abs(bar.points[:, 1]) > 0.29) | (bar.points[:, 1] < 0)
+    half = path(bar.vertices, bar.points[own], bar.normals[own])
+    assert np.abs(fit_axis(half, 6)[0][4:-4, 1]).min() > 0.3 * 0.3  # in the middle of what is left
+    assert np.abs(fit_axis(half, 6, settle=True)[0][4:-4, 1]).max() < 0.15 * 0.3
+
+
 def test_a_hoop_bends_where_it_is_thin():
     """A band .6 wide and .12 thick around a circle of radius .4: its width does not make the curve any smaller."""
     bar, big, m = strip(wiggle=0), 0.4, 48
