@@ -20,8 +20,7 @@ from .evidence import SurfaceGraph
 from .merging import with_fields
 from .sections import Sections, VertexPoints, half_axes, measure_sections, normal_moments
 
-FIT_STIFFNESS = 1.0  # fitted: length over which the curve hardly bends, over the half width of its section
-FIT_DIFFUSION = 0.6  # fitted: length over which the places of points are smoothed on the surface, over that
+FIT_DIFFUSION = 0.6  # fitted: length over which the places of points are smoothed on the surface, over the half width
 FIT_WIDEST = 10.0  # fitted: half width over the spacing of the vertices, at most: those in one place have none
 FIT_STAY = 0.1  # fitted: weight of staying where it was, per point
 FIT_CENTROID = 0.5  # fitted: weight of the points themselves where their normals say nothing
@@ -73,9 +72,9 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
     as the part, whose points say more than their normals. Of a leaf seen from one side the normals hardly differ, and
     meet far behind it: e is the direction most of them have, a the share of their squares across it, and a_0 that of a
     quarter of a tube. An edge has the mean K of its two ends, and of it what is across the edge. Then
-    :math:`\Lambda` has the half thickness in place of w in its direction: a strap bends where it is thin. And where both
-    sides of a flat section were seen, they say where the middle of its width is: the face of a plate that goes on into
-    another bar says it wrongly. See `_middle`.
+    :math:`\Lambda` has the half thickness in place of w in its direction: a strap bends where it is thin. And where
+    both sides of a flat section were seen, they say where the middle of its width is: the face of a plate that goes on
+    into another bar says it wrongly. See `_middle`.
 
     The confidence is (1 - d) c / (c + 8), where c counts over the vertex and its neighbours. The radii are those of
     circles with the area of the section, see `robust_radii`, or without passes `plane_distance_radii`. Points belong to
@@ -173,7 +172,9 @@ class _Nearest(NamedTuple):
     sections: Sections  # at every vertex
     width: np.ndarray  # half of the section's, at every vertex
     faces: np.ndarray  # (m, 6) different entries of the sum of n n^T, at every vertex and its neighbours
-    outward: np.ndarray  # (m, 6) sums of normals away from the curve, and of these times their planes' distances
+    outward: (
+        np.ndarray
+    )  # (m, 12) that of outward normals n, of h n, and of h^2 n n^T, with h from the curve to the plane
 
 
 def _nearest(
@@ -187,9 +188,9 @@ def _nearest(
     a, b = ends.T
     aside = offset - dot(offset, along)[:, None] * along
     squares = aside[:, ROWS] * aside[:, COLUMNS]
-    depth = dot(n, offset)
-    outward = np.column_stack([-np.sign(depth)[:, None] * n, -depth[:, None] * n])
-    facts = np.column_stack([miss, apart, np.full(len(p), 0.5), normal_moments(n, offset), squares, outward])
+    inward, moments = dot(n, offset)[:, None], normal_moments(n, offset)
+    outward = np.concatenate([-np.sign(inward) * n, -inward * n, inward**2 * moments[:, :6]], axis=1)
+    facts = np.column_stack([miss, apart, np.full(len(p), 0.5), moments, squares, outward])
     at = group_sum(facts, edge, len(ends))
     at = group_sum(np.concatenate([at, at]), np.concatenate([a, b]), len(x))
     at = at + group_sum(at[np.concatenate([b, a])], np.concatenate([a, b]), len(x))
@@ -214,20 +215,22 @@ def _pull(near: _Nearest) -> np.ndarray:
 
 
 def _middle(near: _Nearest) -> tuple[np.ndarray, np.ndarray]:
-    r"""How firmly both sides of a flat section say where its middle is, (m,); and how far along the width it is, (m,).
+    r"""How firmly both sides of a flat section say where its middle is, and this times the way along e, (m,) both.
 
     With outward normals n, distances h of their planes from the curve, and the direction e and half width w of the
     width, the sides +e and -e have :math:`c \pm r` normals whose planes are :math:`(w c \pm q) / (c \pm r)` away, where
     :math:`c = \sum (n \cdot e)^2, r = \sum n \cdot e, q = \sum h\, n \cdot e`. Half the difference is the way to the
-    middle. It counts by what both sides have, c - |r|, by how flat the section is, and by (1 - d)^2.
+    middle. It counts by what both sides have, c - |r|, by how flat the section is, and by (1 - d)^2 (1 - v)^2: v is the
+    variance of h over w^2, more than 1 where a thick part becomes a thin one.
     """
     width, thickness, across = near.sections
-    seen = np.einsum("mi,mij,mj->m", across, near.faces[:, FULL], across)
-    odd, distant = dot(near.outward[:, :3], across), dot(near.outward[:, 3:], across)
-    both = np.maximum(seen - np.abs(odd), 0)
-    way = seen * (distant - width * odd) / np.maximum(both * (seen + np.abs(odd)), TINY)
-    flat = (1 - thickness / np.maximum(width, TINY)) * (1 - near.doubt) ** 2
-    return flat * both, np.clip(way, -width, width)
+    seen, squares = (np.einsum("mi,mij,mj->m", across, m[:, FULL], across) for m in (near.faces, near.outward[:, 6:]))
+    odd, distant = dot(near.outward[:, :3], across), dot(near.outward[:, 3:6], across)
+    even = np.clip(2 - squares / np.maximum(width**2 * seen, TINY), 0, 1)
+    flat = (1 - thickness / np.maximum(width, TINY)) * ((1 - near.doubt) * even) ** 2
+    firm = flat * np.maximum(seen - np.abs(odd), 0)
+    way = flat * seen * (distant - width * odd) / np.maximum(seen + np.abs(odd), TINY)
+    return firm, np.clip(way, -firm * width, firm * width)
 
 
 def _spread_width(moments: np.ndarray) -> np.ndarray:
@@ -265,11 +268,9 @@ def _solve(x: np.ndarray, near: _Nearest, p: np.ndarray, pattern: _Pattern, sett
     stay = (FIT_STAY * count + 1e-3 * max(count.mean(), 1))[:, None, None] * np.eye(3) + count[:, None, None] * along
     right = right + np.einsum("nij,nj->ni", stay, x)
     if settle:
-        firm, way = _middle(near)
-        across = near.sections.across
-        sides = FIT_SIDES * firm[:, None, None] * across[:, :, None] * across[:, None]
-        stay = stay + sides
-        right = right + np.einsum("nij,nj->ni", sides, x + way[:, None] * across)
+        (firm, way), across = _middle(near), near.sections.across
+        stay = stay + FIT_SIDES * firm[:, None, None] * across[:, :, None] * across[:, None]
+        right = right + FIT_SIDES * (firm * dot(across, x) + way)[:, None] * across
 
     reach = np.linalg.norm(x[beside] - x[inner, None], axis=2)
     chord = reach[:, ::-1] / np.maximum(reach.sum(axis=1, keepdims=True), TINY)
@@ -277,7 +278,7 @@ def _solve(x: np.ndarray, near: _Nearest, p: np.ndarray, pattern: _Pattern, sett
     squared = np.maximum(reach.prod(axis=1), TINY)
     flat = near.sections.half_thickness / np.maximum(near.sections.half_width, TINY) if settle else np.ones(m)
     half = np.stack([near.width, near.width * flat])[:, inner]
-    half = np.minimum((FIT_STIFFNESS * half) ** 2, FIT_WIDEST**2 * squared) / squared
+    half = np.minimum(half**2, FIT_WIDEST**2 * squared) / squared
     wide, thin = np.maximum(count[inner], 1) * half**2
     normal = unit(cross(x[beside[:, 1]] - x[beside[:, 0]], near.sections.across[inner]))
     stiff = wide[:, None, None] * np.eye(3) + (thin - wide)[:, None, None] * normal[:, :, None] * normal[:, None]

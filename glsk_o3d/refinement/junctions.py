@@ -10,7 +10,7 @@ from ..numerics.polylines import arc_lengths, place_at, relative_distance
 from ..numerics.vectors import TINY, dot
 from ..skeleton import Skeleton
 from .axis_fit import axis_box
-from .limbs import AXIS_LEAVES, AXIS_LENGTH, Limbs
+from .limbs import AXIS_LEAVES, AXIS_LENGTH, MEETING_STAY, Limbs
 from .merging import merge_into, with_fields
 from .sections import VertexPoints
 
@@ -20,7 +20,6 @@ LINE_STEP = 0.1  # derived: radii from one place on a limb to the next that is a
 LINE_STEPS = 400  # derived: places at most
 SURFACE_WEIGHT = 12.0  # of the surface that fits a sphere, over that of a line that says exactly where it is
 SURFACE_FIT = 0.25  # distance from the sphere, over the radius, at which a point counts half
-MEETING_HOLD = 0.2  # weight of where the junction was: a straight tube says nothing of where along it
 MEETING_ROUNDS = 10  # precision: from then on hardly anything moves
 
 
@@ -194,8 +193,8 @@ def meet(
     spread, noise = np.array([(line.spread, line.bend / line.radius + LINE_NOISE) for line in known]).reshape(-1, 2).T
     across = np.eye(3) - way[:, :, None] * way[:, None]
     for _ in range(MEETING_ROUNDS):
-        matrix, right = np.diag([MEETING_HOLD] * 3 + [1e-6]), np.zeros(4)
-        right[:3] = MEETING_HOLD * (near - place)
+        matrix, right = np.diag([MEETING_STAY] * 3 + [1e-6]), np.zeros(4)
+        right[:3] = MEETING_STAY * (near - place)
         right[3] = 1e-6 * touching
         offset = middle - place
         ahead = dot(offset, way)

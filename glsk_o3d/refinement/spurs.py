@@ -19,7 +19,6 @@ from .sections import VertexPoints, measure_sections
 
 SPUR_POINTS = 128  # speed: of a branch that are enough to say how far it reaches
 SPUR_QUANTILE = 0.9  # fitted: share of a spur's points that its reach covers
-FAR_OUT = 20.0  # fitted: half widths beyond which a protrusion says no more; of no half width none count
 LEAST_OUT = 0.3  # fitted: half widths below which a protrusion says no more
 LONG_OUTSIDE = 4.0  # derived: half widths of a part that is twice as long as it is wide
 BESIDE = 2.0  # fitted: half widths from the curve to where nothing is beside a limb
@@ -111,7 +110,7 @@ def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
         own = cloud.points[cloud.members.of(part)]
         # by how far they are, and not as they come, which depends on how the object is turned
         points = own[np.argsort(norm(own - skeleton.vertices[junction]))][:: len(own) // SPUR_POINTS + 1]
-        out = np.clip(_standing_out(limbs, k, junction, points, ending), 0, FAR_OUT * own_half)
+        out = max(_standing_out(limbs, k, junction, points, ending), 0.0) if own_half > 0 else 0.0
         facts = dict(
             protrusion=float(np.log(out / max(own_half, TINY) + LEAST_OUT) * (1 - shared)),
             certainty=-float(np.log1p(-np.average(confidence[body], weights=count[body]))),

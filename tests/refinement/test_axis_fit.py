@@ -199,7 +199,7 @@ def test_where_noise_is_the_curve_is_smooth_and_near_the_axis(noise, known):
 def test_bending_makes_a_ring_smaller_by_its_closed_form(monkeypatch, small):
     """Per point, (w / h)^4 |x - chord|^2 = w^4 / (4 r^2) on a circle of radius r against 1/2 (r - big)^2 by normals."""
     blurred = fit_axis(torus(small=small), 12)[0]
-    monkeypatch.setattr(axis_fit, "FIT_STIFFNESS", 0.1)
+    monkeypatch.setattr(axis_fit, "FIT_WIDEST", 0.1)
     sharp = fit_axis(torus(small=small), 12)[0]
     smaller = np.hypot(*sharp[:, :2].T).mean() - np.hypot(*blurred[:, :2].T).mean()
     assert smaller == pytest.approx(small**4 / (2 * 0.4**3), rel=0.05)
