@@ -109,7 +109,9 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
         raise InvalidCloudError(
             f"no part of the skeleton has {MIN_SECTION_POINTS} points around it: is this the cloud it was made from?"
         )
-    apart = ~_at_junctions(skeleton, sections.places, cloud)
+    # places in the largest ball around a junction that holds no point do not count
+    junctions = skeleton.vertices[skeleton.junctions]
+    apart = (cdist(sections.places, junctions) >= cKDTree(cloud).query(junctions)[0]).all(axis=1)
     counted = apart if (apart & found).any() else np.ones_like(found)
     found &= counted
     offsets, radii = sections.offsets[found], sections.radii[found]
@@ -139,13 +141,6 @@ def _neighbourhood(cloud: np.ndarray) -> tuple[float, int]:
     distance, neighbour = nearest_neighbours(cloud, k)
     pairs = np.column_stack([np.repeat(np.arange(len(cloud)), k), neighbour.ravel()])
     return float(np.median(distance[:, -1])), int(component_labels(len(cloud), pairs).max()) + 1
-
-
-def _at_junctions(skeleton: Skeleton, places: np.ndarray, cloud: np.ndarray) -> Any:
-    """Whether each place lies in the largest ball around a junction that holds no point of the cloud."""
-    junctions = skeleton.vertices[skeleton.junctions]
-    clearance = cKDTree(cloud).query(junctions)[0]
-    return (cdist(places, junctions) < clearance).any(axis=1)
 
 
 class Sections(NamedTuple):

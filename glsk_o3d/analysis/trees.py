@@ -102,7 +102,10 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
         )
     if not np.isfinite(skeleton.radii).all():
         raise InvalidParameterError("the skeleton has no radii: a file of a format without them was read")
-    table, beyond = branch_table(skeleton, _root(skeleton, root)), _beyond_tips(skeleton)
+    # vertices that are numbered outwards have one neighbour before them each
+    outwards = np.array_equal(np.sort(skeleton.edges[:, 1]), np.arange(1, len(skeleton.vertices)))
+    root = 0 if root is None and not skeleton.report.root and outwards else root
+    table, beyond = branch_table(skeleton, root), _beyond_tips(skeleton)
     last = np.full(len(table), -1)
     rows: list[tuple[Any, ...]] = []
     for row in np.argsort(table.level[: len(skeleton.branches)], kind="stable").tolist():
@@ -135,13 +138,6 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
     if not rows:
         raise InvalidParameterError("the skeleton has no branches of any length: there is nothing to put cylinders on")
     return Cylinders(*(np.array(column) for column in zip(*rows, strict=True)))
-
-
-def _root(skeleton: Any, root: Any) -> Any:
-    """As given, or the vertex from which all are numbered outwards: each other one has one neighbour before it."""
-    later = np.sort(skeleton.edges[:, 1])
-    outwards = np.array_equal(later, np.arange(1, len(skeleton.vertices)))
-    return 0 if root is None and not skeleton.report.root and outwards else root
 
 
 def _length_inside(skeleton: Any, path: np.ndarray, along: np.ndarray, others: list[np.ndarray]) -> float:

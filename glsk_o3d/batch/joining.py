@@ -193,7 +193,9 @@ def join_tiles(skeletons: Mapping[Tile, Skeleton], grid: Grid) -> tuple[Skeleton
     for tile in sorted(skeletons):
         near = [each for each in brought if max(abs(a - b) for a, b in zip(each, tile, strict=True)) <= 1]
         strands = Strands.of(skeletons[tile]).within(*grid.box(tile, grid.trust))
-        joint.thickest = max(joint.thickest, _thickest(strands, grid, tile))
+        # the skeleton of a part within reach of a cut through the points is not to be trusted
+        cut = ~inside(strands.values, *grid.box(tile, grid.overlap), CUT_REACH * strands.values[:, 3])
+        joint.thickest = float(np.nanmax(strands.values[cut, 3], initial=joint.thickest))
         strands = strands.with_pieces(strands.touching(*grid.box(tile, CLAIM_SHARE * grid.trust)))
         theirs = None
         if near:
@@ -203,13 +205,6 @@ def join_tiles(skeletons: Mapping[Tile, Skeleton], grid: Grid) -> tuple[Skeleton
             joint.met.append(met)
         brought[tile] = joint.bring(strands, theirs)
     return joint.finished()
-
-
-def _thickest(strands: Strands, grid: Grid, tile: Tile) -> float:
-    """Radius of the thickest part within reach of a cut through the points: its skeleton is not to be trusted."""
-    values = strands.values
-    near = ~inside(values, *grid.box(tile, grid.overlap), CUT_REACH * values[:, 3])
-    return float(np.nanmax(values[near, 3], initial=0))
 
 
 def _not_there(

@@ -55,17 +55,14 @@ def _filter_facts(cls: type[Parameters]) -> dict[str, Any]:
         flow = {name: "cloud" if kind is Cloud else kind.__name__ for name, kind in kinds.items()}
     kind = "filter" if flow["consumes"] else "stopping rule"
     fields = dataclasses.fields(cls)  # type: ignore[arg-type]
-    parameters = [{"name": field.name, **field.metadata, "default": _default(field)} for field in fields]
+    defaults = [repr(each.default) if dataclasses.is_dataclass(each.default) else each.default for each in fields]
+    parameters = [{"name": f.name, **f.metadata, "default": told} for f, told in zip(fields, defaults, strict=True)]
     return {"name": cls.__name__, "kind": kind, **_origin(cls), **flow, "parameters": parameters}
 
 
 def _pipeline_facts(name: str, make: Callable[[], Pipeline[Any]]) -> dict[str, Any]:
     stages = make().stages
     return {"name": name, "kind": "pipeline", **_origin(make), "expression": " | ".join(map(repr, stages))}
-
-
-def _default(field: dataclasses.Field[Any]) -> Any:
-    return repr(field.default) if dataclasses.is_dataclass(field.default) else field.default
 
 
 def _origin(thing: Any) -> dict[str, Any]:

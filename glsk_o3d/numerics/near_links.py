@@ -66,7 +66,11 @@ def join_pieces(places: np.ndarray, links: csr_matrix, longest: np.ndarray) -> t
         row, column = np.nonzero(piece[neighbour] != piece[:, None])
         ends = np.column_stack([row, neighbour[row, column]])
         lost = np.setdiff1d(piece, piece[row])  # pieces that see nothing but themselves
-        some = [_nearest_other(places, piece, each) for each in lost[lost != np.bincount(piece).argmax()]]
+        some = []
+        for each in lost[lost != np.bincount(piece).argmax()]:
+            inside, others = np.flatnonzero(piece == each), np.flatnonzero(piece != each)
+            distance, found = cKDTree(places[others]).query(places[inside])
+            some.append(np.array([inside[distance.argmin()], others[found[distance.argmin()]]]))
         ends = np.concatenate([ends, *(pair[None] for pair in some)])
         way = places[ends[:, 1]] - places[ends[:, 0]]
         length = norm(way)
@@ -95,12 +99,6 @@ def steps(links: csr_matrix) -> csr_matrix:
     step = csr_matrix(links + identity(links.shape[0]))
     step.data[:] = 1
     return step
-
-
-def _nearest_other(places: np.ndarray, piece: np.ndarray, each: int) -> np.ndarray:
-    inside, others = np.flatnonzero(piece == each), np.flatnonzero(piece != each)
-    distance, found = cKDTree(places[others]).query(places[inside])
-    return np.array([inside[distance.argmin()], others[found[distance.argmin()]]])
 
 
 def _spanning(piece: np.ndarray, ends: np.ndarray, length: np.ndarray) -> np.ndarray:

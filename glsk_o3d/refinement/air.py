@@ -63,7 +63,11 @@ def branch_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[np.nd
     area = along.sum()
     seen = max(area / max(tubes, area * TINY, TINY), TINY)  # a line has no tubes
     bonds = evidence.bonds(skeleton)
-    around, keys = _neighbours(skeleton), edges @ [m, 1]
+    keys = edges @ [m, 1]
+    around: list[list[tuple[int, float]]] = [[] for _ in vertices]
+    for (a, b), step in zip(edges.tolist(), skeleton.edge_lengths.tolist(), strict=True):
+        around[a].append((b, step))
+        around[b].append((a, step))
 
     def numbers(path: np.ndarray) -> np.ndarray:
         return np.searchsorted(keys, np.sort(np.column_stack([path[:-1], path[1:]]), axis=1) @ [m, 1])
@@ -100,14 +104,6 @@ def _window_means(ends: np.ndarray, places: np.ndarray, width: float, *amounts: 
     for each in amounts:
         total = np.append(0, np.cumsum(each))
         yield (np.interp(high, ends, total) - np.interp(low, ends, total)) / np.maximum(high - low, TINY)
-
-
-def _neighbours(skeleton: Skeleton) -> list[list[tuple[int, float]]]:
-    around: list[list[tuple[int, float]]] = [[] for _ in skeleton.vertices]
-    for (a, b), length in zip(skeleton.edges.tolist(), skeleton.edge_lengths.tolist(), strict=True):
-        around[a].append((b, length))
-        around[b].append((a, length))
-    return around
 
 
 def _sides(branch: np.ndarray, around: list[list[tuple[int, float]]], m: int) -> np.ndarray:
