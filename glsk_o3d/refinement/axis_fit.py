@@ -26,7 +26,7 @@ FIT_STAY = 0.1  # fitted: weight of staying where it was, per point
 FIT_CENTROID = 0.5  # fitted: weight of the points themselves where their normals say nothing
 # derived: share of the squared normals of a quarter of a tube that stand across the others: of less, they do not say
 FIT_OPEN = 1 / 2 - 1 / np.pi  # how deep behind them the axis is; of half a tube it is .5
-FIT_SIDES = 30.0  # fitted: weight of the sides of a flat section; from 10 to 100 it is the same
+FIT_SIDES = 20.0  # fitted: weight of the sides of a flat section; with 10 and 30 the scores are the same
 FIT_WALK = 3  # measured: vertices by which a point may move along the curve in a pass
 # derived: over the diagonal, how far out of the box of its points an axis may be: they show a third of a tube at least,
 FIT_BEYOND = 0.05  # whose axis is half a radius away from it, and a tube that is seen so is some ten radii long
@@ -172,9 +172,8 @@ class _Nearest(NamedTuple):
     sections: Sections  # at every vertex
     width: np.ndarray  # half of the section's, at every vertex
     faces: np.ndarray  # (m, 6) different entries of the sum of n n^T, at every vertex and its neighbours
-    outward: (
-        np.ndarray
-    )  # (m, 12) that of outward normals n, of h n, and of h^2 n n^T, with h from the curve to the plane
+    # (m, 12) that of outward normals n, of h n, and of h^2 n n^T, with h from the curve to the plane
+    outward: np.ndarray
 
 
 def _nearest(
@@ -218,16 +217,21 @@ def _middle(near: _Nearest) -> tuple[np.ndarray, np.ndarray]:
     r"""How firmly both sides of a flat section say where its middle is, and this times the way along e, (m,) both.
 
     With outward normals n, distances h of their planes from the curve, and the direction e and half width w of the
-    width, the sides +e and -e have :math:`c \pm r` normals whose planes are :math:`(w c \pm q) / (c \pm r)` away, where
-    :math:`c = \sum (n \cdot e)^2, r = \sum n \cdot e, q = \sum h\, n \cdot e`. Half the difference is the way to the
-    middle. It counts by what both sides have, c - |r|, by how flat the section is, and by (1 - d)^2 (1 - v)^2: v is the
-    variance of h over w^2, more than 1 where a thick part becomes a thin one.
+    width, the sides +e and -e have (c + r) / 2 and (c - r) / 2 normals, with :math:`c = \sum (n \cdot e)^2` and
+    :math:`r = \sum n \cdot e`. Their planes are (w c + q) / (c + r) and (w c - q) / (c - r) away, with :math:`q = \sum h\, n
+    \cdot e`. Half the difference is the way to the middle, at most w. It counts by what both sides have, c - |r|, by how flat the
+    section is, and by how even: by max(1 - v, 0)^2 for the variance v of h over w^2, more than 1 where a thick part
+    becomes a thin one, and by the same for the faces between the sides, more than 1 where noise is thicker than they.
     """
     width, thickness, across = near.sections
-    seen, squares = (np.einsum("mi,mij,mj->m", across, m[:, FULL], across) for m in (near.faces, near.outward[:, 6:]))
     odd, distant = dot(near.outward[:, :3], across), dot(near.outward[:, 3:6], across)
-    even = np.clip(2 - squares / np.maximum(width**2 * seen, TINY), 0, 1)
-    flat = (1 - thickness / np.maximum(width, TINY)) * ((1 - near.doubt) * even) ** 2
+    flat = 1 - thickness / np.maximum(width, TINY)
+    both = np.stack([near.faces, near.outward[:, 6:]])[:, :, FULL]
+    of_sides = np.einsum("mi,kmij,mj->km", across, both, across)
+    of_faces = np.trace(both, axis1=2, axis2=3) - of_sides
+    for half, (normals, squares) in ((width, of_sides), (thickness, of_faces)):
+        flat *= np.clip(2 - squares / np.maximum(half**2 * normals, TINY), 0, 1) ** 2
+    seen = of_sides[0]
     firm = flat * np.maximum(seen - np.abs(odd), 0)
     way = flat * seen * (distant - width * odd) / np.maximum(seen + np.abs(odd), TINY)
     return firm, np.clip(way, -firm * width, firm * width)

@@ -15,7 +15,7 @@ from .sections import VertexPoints
 AXIS_LEAVES = 1.3  # distance from the other limbs, over that from them to the surface, where half a limb is undisturbed
 AXIS_LENGTH = 2.5  # radii from there over which its line is taken
 AXIS_SHORT = 2.0  # length in radii, from each junction, below which a branch has no undisturbed place
-MEETING_STAY = 0.1  # weight of where the junction was, per meeting: lines that are nearly one meet anywhere
+MEETING_STAY = 0.1  # weight of where a junction was: lines that are nearly one, or of a straight tube, meet anywhere
 
 
 class Limbs:
