@@ -218,10 +218,11 @@ def _middle(near: _Nearest) -> tuple[np.ndarray, np.ndarray]:
 
     With outward normals n, distances h of their planes from the curve, and the direction e and half width w of the
     width, the sides +e and -e have (c + r) / 2 and (c - r) / 2 normals, with :math:`c = \sum (n \cdot e)^2` and
-    :math:`r = \sum n \cdot e`. Their planes are (w c + q) / (c + r) and (w c - q) / (c - r) away, with :math:`q = \sum h\, n
-    \cdot e`. Half the difference is the way to the middle, at most w. It counts by what both sides have, c - |r|, by how flat the
-    section is, and by how even: by max(1 - v, 0)^2 for the variance v of h over w^2, more than 1 where a thick part
-    becomes a thin one, and by the same for the faces between the sides, more than 1 where noise is thicker than they.
+    :math:`r = \sum n \cdot e`. Their planes are (w c + q) / (c + r) and (w c - q) / (c - r) away, where q is the sum of
+    :math:`h\, n \cdot e`. Half the difference is the way to the middle, at most w. It counts by what both sides have,
+    c - |r|, by how flat the section is, and by how even: by max(1 - v, 0)^2 for the variance v of h over w^2, more than
+    1 where a thick part becomes a thin one, and by the same for the faces between the sides, more than 1 where noise is
+    thicker than they.
     """
     width, thickness, across = near.sections
     odd, distant = dot(near.outward[:, :3], across), dot(near.outward[:, 3:6], across)
