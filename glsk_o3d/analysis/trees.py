@@ -102,9 +102,8 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
         )
     if not np.isfinite(skeleton.radii).all():
         raise InvalidParameterError("the skeleton has no radii: a file of a format without them was read")
-    # vertices that are numbered outwards have one neighbour before them each
-    outwards = np.array_equal(np.sort(skeleton.edges[:, 1]), np.arange(1, len(skeleton.vertices)))
-    root = 0 if root is None and not skeleton.report.root and outwards else root
+    if root is None and not skeleton.report.root:  # numbered outwards, all but the first have one neighbour before them
+        root = 0 if np.array_equal(np.sort(skeleton.edges[:, 1]), np.arange(1, len(skeleton.vertices))) else None
     table, beyond = branch_table(skeleton, root), _beyond_tips(skeleton)
     last = np.full(len(table), -1)
     rows: list[tuple[Any, ...]] = []

@@ -300,8 +300,12 @@ class _Joint:
         same[one] = other
         values[other] = (values[other] + values[one]) / 2
         alive = same == np.arange(len(values))
-        touching = np.array(self._touching, np.int64).reshape(-1, 2)
-        edges, loose = _tied(simple_edges(same[np.concatenate(self._edges)]), same[touching], alive)
+        touching = same[np.array(self._touching, np.int64).reshape(-1, 2)]
+        edges = simple_edges(same[np.concatenate(self._edges)])
+        connected = DisjointSet(range(len(alive)))  # cut ends are tied to curves beside them, if that closes no loop
+        pairs = component_labels(len(alive), edges)[touching].tolist()
+        tied = np.array([connected.merge(*pair) for pair in pairs], bool)
+        edges, loose = simple_edges(np.concatenate([edges, touching[tied]])), touching[~tied, 0]
         ends = np.concatenate([np.array(list(self._open), np.int64), loose])
         ends = ends[np.bincount(edges.ravel(), minlength=len(values))[ends] < 2]  # where curves fork, some go on
         gone, ends = _stubs(values, edges, ends)
@@ -313,14 +317,6 @@ class _Joint:
         edges = simple_edges(number[edges])
         known = dict(zip(("radii", "confidence", "half_width", "half_thickness"), kept.T[[3, 4, 6, 7]], strict=True))
         return Skeleton(kept[:, :3], edges, vertex_of_point=none, points=none, normals=none, **known), seams
-
-
-def _tied(edges: np.ndarray, touching: np.ndarray, alive: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Edges from cut ends to the curves beside them, where they close no loop; and the ends that got none."""
-    piece = component_labels(len(alive), edges)
-    connected = DisjointSet(range(len(alive)))
-    ties = np.array([connected.merge(*pair) for pair in piece[touching].tolist()], bool)
-    return simple_edges(np.concatenate([edges, touching[ties]])), touching[~ties, 0]
 
 
 def _stubs(values: np.ndarray, edges: np.ndarray, ends: np.ndarray) -> tuple[list[int], np.ndarray]:

@@ -33,7 +33,10 @@ def grasps(
     from .. import read_cloud, read_skeleton
     from ..analysis import grasp_candidates
 
-    outputs = [Output(path, GRASP_ENDINGS, "grasps are JSON or CSV", _save) for path in output or []]
+    def save(best: GraspCandidates, path: Path) -> None:
+        {".json": best.to_json, ".csv": best.to_csv}[path.suffix.lower()](path)
+
+    outputs = [Output(path, GRASP_ENDINGS, "grasps are JSON or CSV", save) for path in output or []]
     check_outputs(outputs, skeleton, cloud)
     found = grasp_candidates(
         read_skeleton(skeleton),
@@ -45,10 +48,6 @@ def grasps(
     best = found[:count]
     facts = {"skeleton": str(skeleton), "found": len(found), **best.as_dict()}
     tell(facts, lambda: _print(best, len(found)), write_each(outputs, best))
-
-
-def _save(best: GraspCandidates, path: Path) -> None:
-    {".json": best.to_json, ".csv": best.to_csv}[path.suffix.lower()](path)
 
 
 def _print(best: GraspCandidates, found: int) -> None:

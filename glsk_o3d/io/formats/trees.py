@@ -62,7 +62,10 @@ def write_urdf(skeleton: Skeleton) -> bytes:
     steps = frame - np.where(root[:, None], 0.0, frame[parent])
     span = vertices - frame
     length, thickness = norm(span), (radii + radii[parent]) / 2
-    mass, across, along = _solids(length, thickness, root)  # a root has no cylinder
+    # masses of cylinders, of balls at roots, which have none, and their moments of inertia across and along the axis
+    mass = URDF_DENSITY * np.pi * thickness**2 * np.where(root, thickness * 4 / 3, length)
+    along = mass * thickness**2 * np.where(root, 2 / 5, 1 / 2)
+    across = np.where(root, along, along / 2 + mass * length**2 / 12)
     # a cylinder lies along z: tilt it about y, then turn it about z
     turn = np.column_stack(
         [0 * length, np.arctan2(np.hypot(*span.T[:2]), span[:, 2]), np.arctan2(span[:, 1], span[:, 0])]
@@ -90,13 +93,6 @@ def write_urdf(skeleton: Skeleton) -> bytes:
     indent(robot)
     written: bytes = tostring(robot, encoding="utf-8", xml_declaration=True)
     return written + b"\n"
-
-
-def _solids(length: np.ndarray, radius: np.ndarray, ball: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Masses of cylinders, or of balls where `ball` says so, and their moments of inertia across and along the axis."""
-    mass = URDF_DENSITY * np.pi * radius**2 * np.where(ball, radius * 4 / 3, length)
-    along = mass * radius**2 * np.where(ball, 2 / 5, 1 / 2)
-    return mass, np.where(ball, along, along / 2 + mass * length**2 / 12), along
 
 
 def _shape(link: Element, use: str, kind: str, place: np.ndarray, turn: np.ndarray, **size: float) -> None:
