@@ -230,8 +230,9 @@ def _middle(near: _Nearest) -> tuple[np.ndarray, np.ndarray]:
     both = np.stack([near.faces, near.outward[:, 6:]])[:, :, FULL]
     of_sides = np.einsum("mi,kmij,mj->km", across, both, across)
     of_faces = np.trace(both, axis1=2, axis2=3) - of_sides
-    for half, (normals, squares) in ((width, of_sides), (thickness, of_faces)):
-        flat *= np.clip(2 - squares / np.maximum(half**2 * normals, TINY), 0, 1) ** 2
+    for half, sums in ((width, of_sides), (thickness, of_faces)):
+        normals, squares = np.maximum(sums, 0)  # rounding leaves less than nothing
+        flat *= np.clip(2 - squares / np.maximum(np.maximum(half**2 * normals, squares / 2), TINY), 0, 1) ** 2
     seen = of_sides[0]
     firm = flat * np.maximum(seen - np.abs(odd), 0)
     way = flat * seen * (distant - width * odd) / np.maximum(seen + np.abs(odd), TINY)
