@@ -94,10 +94,12 @@ def _grow(cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int,
     """Cut the end of a path, and let it grow anew; None if too few points say where."""
     places, radii, half_widths = cloud.skeleton.vertices[path], sections.radius[path], sections.half_width[path]
     along = arc_lengths(places)
-    length = along[-1]
+    last = _last(cloud, path, along, first)
+    length = along[last]
     run, cut, way = _within(along, length, END_SIZE * np.median(radii)), len(path), np.zeros(3)
     late = (length - along <= half_widths) & (other | (along >= half_widths))
-    stop = max(along[np.argmax(late)] if late.any() else length, length / 2)
+    late[last + 1 :] = True
+    stop = np.clip(along[np.argmax(late)] if late.any() else length, length / 2, length)
     for _ in range(2):  # how far the points reach is seen along a run that is no part of the cap itself
         radius, wide = np.median(radii[run]), np.median(half_widths[run])
         start = max(stop - END_RUN * radius, 0)
@@ -129,6 +131,18 @@ def _grow(cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int,
     # edges of no length are those of no limb
     number = max(round(min(tip / max(step, TINY), len(points))), 1)
     return _Grown(path, cut, anchor + end.curve(np.arange(1, number + 1) / number * tip), path[run], thick)
+
+
+def _last(cloud: VertexPoints, path: np.ndarray, along: np.ndarray, first: int) -> int:
+    """Number along a path of the last vertex that is not bent into a corner, to beside points of others.
+
+    Those behind it have hardly any point. The part of them is no longer than what a cap bends.
+    """
+    own = cloud.members.of(path)
+    thick = np.sqrt((cloud.offset[own] ** 2).sum() / max(len(own), 1))
+    some = np.cumsum(cloud.count[path][::-1])[::-1] > (1 - END_REACH) * len(own)
+    least = np.searchsorted(along, along[-1] - END_CUT * thick)
+    return int(max(np.flatnonzero(some).max(initial=0), least, min(first, len(path) - 1)))
 
 
 def _within(along: np.ndarray, stop: float, length: float) -> np.ndarray:

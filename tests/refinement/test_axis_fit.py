@@ -197,6 +197,13 @@ def test_the_section_of_a_flat_bar_is_its_own_and_its_width_is_doubt(wide, thick
     sure = 1 - min(2 * miss / apart, 1)
     count = 6000 / 40 * 3  # the points of three vertices
     assert fitted.confidence[4:-4].mean() == pytest.approx(sure * count / (count + HALF_SUPPORT), abs=0.02)
+    # a settled curve is in the middle of its points, as far as they and their normals say that the section is flat
+    flat = (face - side) * (
+        1 - np.sqrt((face * thick**2 + side * thick**2 / 3) / (face * wide**2 / 3 + side * wide**2))
+    )
+    support = count / (count + HALF_SUPPORT)
+    settled = axis_fit.fit_axis(strip(wide, thick), 3, settle=True).confidence[4:-4].mean()
+    assert settled == pytest.approx(support * (1 - (1 - sure) * (1 - support * flat)), abs=0.03)
     # the radius is that of the area, and up to a half more in places: a part of the width counts as noise
     ratio = fitted.radii[4:-4] / np.sqrt(wide * thick)
     assert ratio.min() > 0.95
@@ -229,6 +236,13 @@ def test_where_noise_is_the_curve_is_smooth_and_near_the_axis(noise, known):
     assert np.ptp(moved[:, 0]) == pytest.approx(2 * 0.95, rel=0.05)
 
 
+@pytest.mark.parametrize("noise", [0.3, 1.0])
+def test_noise_is_not_flat(noise):
+    """A settled curve knows no more of where the axis is than one that has not settled."""
+    sure, settled = (fit_axis(noisy(noise, known=False), 3, settle=settle)[1].mean() for settle in (False, True))
+    assert settled < sure + 0.05
+
+
 @pytest.mark.parametrize("small", [0.1, 0.15])
 def test_bending_makes_a_ring_smaller_by_its_closed_form(monkeypatch, small):
     """Per point, (w / h)^4 |x - chord|^2 = w^4 / (4 r^2) on a circle of radius r against 1/2 (r - big)^2 by normals."""
@@ -249,6 +263,16 @@ def test_confidence_of_a_curve_off_the_axis(height):
     inner = slice(2, -2)  # beyond the ends the way to the curve has a part along it
     expected = R**2 / (R**2 + height**2) * near / (near + HALF_SUPPORT)
     np.testing.assert_allclose(fit_axis(tube((0, height)), 0)[1][inner], expected, rtol=0.02)
+
+
+def test_points_say_how_wide_and_flat_a_section_is():
+    angle = (np.arange(200) + 0.5) * np.pi / 100
+    circle = R * np.column_stack([0 * angle, np.cos(angle), np.sin(angle)])
+    band = np.column_stack([np.zeros((400, 1)), np.linspace(-0.3, 0.3, 400), np.zeros(400)])
+    for points, wide, flat in ((circle, R, 0), (circle[:100], R, 0), (band, 0.3, 1)):
+        moments = (points[:, axis_fit.ROWS] * points[:, axis_fit.COLUMNS]).mean(axis=0)
+        found = axis_fit._spread(moments[None])
+        np.testing.assert_allclose(np.concatenate(found), [wide, flat], atol=0.01 * wide)
 
 
 # ---- what does not matter, and what is not there

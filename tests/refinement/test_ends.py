@@ -5,6 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton, samples, skeletonize
+from glsk_o3d.refinement.ends import regrow_ends
 
 R = 0.1
 LENGTH = 1.2
@@ -58,6 +59,37 @@ def test_an_end_stops_where_its_limb_does(refine, cap, where, stop, hook):
     """Wherever contraction left it: half a radius inside a face, and at the centre of a round cap."""
     found = tip(refine(fork(*limb(cap), stop, hook), recentre=3))
     np.testing.assert_allclose(found, [LENGTH + where * R, 0, 0], atol=0.15 * R)
+
+
+@pytest.mark.parametrize("beside", [0, 8])
+def test_an_end_bent_into_a_corner_where_others_have_the_points_is_straightened(beside):
+    """The last radius of the curve turns aside, and owns next to nothing: only what is behind it knows of the limb."""
+    points, normals = limb("flat")
+    straight, k = fork(points, normals, LENGTH - R / 2), 12
+    m, end = len(straight.vertices), len(straight.vertices) - 3
+    aside = np.linspace(0, R, k + 1)[1:, None] * [0.2, 1, 0] + straight.vertices[end]
+    edges = [*straight.edges.tolist(), [end, m], *([i, i + 1] for i in range(m, m + k - 1))]
+    owner = straight.vertex_of_point.copy()
+    owner[np.argsort(np.linalg.norm(points - aside[-1], axis=1))[:beside]] = m + k - 1
+    radii = np.where(np.arange(m + k) < m, R, R / 20)
+    bent = Skeleton(np.concatenate([straight.vertices, aside]), sorted(edges), radii, owner, points, normals)
+    grown = regrow_ends(bent)
+    np.testing.assert_allclose(tip(grown), [LENGTH - R / 2, 0, 0], atol=0.2 * R)
+    limbs = grown.vertices[np.abs(grown.vertices[:, 1]) < 1]
+    assert np.abs(limbs[:, 1:]).max() < 0.2 * R
+
+
+def test_the_end_of_a_long_bent_limb_is_not_cut_by_its_length():
+    """A fiftieth of the points of a spring are two of its radii: they stay as they are, but for the cap."""
+    turn = np.linspace(0, 10 * np.pi, 40_000)
+    axis = np.column_stack([np.cos(turn), np.sin(turn), turn / 20])
+    rng, way = np.random.default_rng(0), np.gradient(axis, axis=0)
+    place = rng.integers(0, len(axis), 8000)
+    out = np.cross(way[place], rng.normal(size=(8000, 3)))
+    points = axis[place] + 0.08 * out / np.linalg.norm(out, axis=1, keepdims=True)
+    found = skeletonize(points)
+    assert cKDTree(axis).query(found.vertices)[0].max() < 0.4 * 0.08
+    assert cKDTree(found.vertices).query(axis[[0, -1]])[0].max() < 0.08
 
 
 def bottle(thin, long, n=6000):
