@@ -21,9 +21,9 @@ from .merging import with_fields
 from .sections import Sections, VertexPoints, half_axes, measure_sections, normal_moments
 
 FIT_DIFFUSION = 0.6  # fitted: length over which the places of points are smoothed on the surface, over the half width
-FIT_SPREAD = np.sqrt(2)  # fitted: half width where normals say nothing, over that of the points; 1 lets noise bend it
+FIT_SPREAD = 2**0.5  # fitted: half width where normals say nothing, over that of the points; 1 lets noise bend it
 FIT_WIDEST = 10.0  # fitted: half width over the spacing of the vertices, at most: those in one place have none
-FIT_STAY = 0.1  # fitted: weight of staying where it was, per point
+FIT_STAY = 0.1  # fitted: weight of staying where it was, per point; of a junction, per line
 FIT_CENTROID = 0.5  # fitted: weight of the points themselves where their normals say nothing
 # derived: share of the squared normals of a quarter of a tube that stand across the others: of less, they do not say
 FIT_OPEN = 1 / 2 - 1 / np.pi  # how deep behind them the axis is; of half a tube it is .5
@@ -31,7 +31,7 @@ FIT_SIDES = 20.0  # fitted: weight of the sides of a flat section; with 10 and 3
 FIT_WALK = 3  # measured: vertices by which a point may move along the curve in a pass
 # derived: over the diagonal, how far out of the box of its points an axis may be: they show a third of a tube at least,
 FIT_BEYOND = 0.05  # whose axis is half a radius away from it, and a tube that is seen so is some ten radii long
-HALF_SUPPORT = 8  # fitted: points that support a vertex half
+HALF_SUPPORT = 8  # fitted: points that support a vertex half; an edge is cut into a piece at most for each so many
 # the axis of half a tube is 2 / pi radii away from the mean of its points, which scatter around that by their standard
 # deviation; no axis is farther off
 HALF_TUBE_REACH = (2 / np.pi) / np.sqrt(1 - (2 / np.pi) ** 2)
@@ -320,7 +320,6 @@ class _Pattern:
         return csc_array((rows.data, rows.indices, rows.indptr), shape=rows.shape)
 
 
-POINTS_PER_PIECE = 8  # fitted: an edge is cut into at most one piece for every so many input points, begun ones counted
 SUBDIVISION_CHUNK = 65536  # speed: points at a time: memory stays flat
 
 
@@ -333,7 +332,7 @@ def subdivide_edges(skeleton: Skeleton, spacing: float) -> Skeleton:
     half = measure_sections(skeleton).radius[ends].mean(axis=1)
     length = np.maximum(spacing * half, np.maximum(1e-3 * skeleton.edge_lengths, TINY))
     points = (VertexPoints(skeleton).mass / np.maximum(skeleton.degree, 1))[ends].sum(axis=1)
-    most = np.maximum(points / POINTS_PER_PIECE, 1)
+    most = np.maximum(points / HALF_SUPPORT, 1)
     pieces = np.ceil(np.clip(skeleton.edge_lengths / length, 1, most)).astype(int)  # also edges of no length are one
     inner = pieces - 1
     edge = np.repeat(np.arange(len(ends)), inner)

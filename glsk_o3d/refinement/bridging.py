@@ -20,7 +20,7 @@ BRIDGE_COSINE = 0.5  # least cosine between the bridge and the end
 BRIDGE_LOOK_BACK = 3.0  # radii to look back along a branch for its direction
 DETOUR = 3.0  # least way along the skeleton over that across the gap; less would make a loop of nothing
 BRIDGE_SAMPLES = np.arange(1, 8)[:, None] / 8  # derived: places along a bridge, evenly
-CAP_BACK, CAP_AHEAD, CAP_WIDTH = 1.0, 2.5, 1.6  # radii around an end in which its cap is
+CAP_AHEAD, CAP_WIDTH = 2.5, 1.6  # radii from an end, and one back, in which its cap is
 
 
 class _End(NamedTuple):
@@ -100,7 +100,7 @@ def _cap(end: _End, evidence: Evidence) -> float:
     offset = evidence.points - end.place
     ahead = offset @ end.outward
     beside = dot(offset, offset) - ahead**2
-    near = (ahead > -CAP_BACK * end.radius) & (ahead < CAP_AHEAD * end.radius)
+    near = (ahead > -end.radius) & (ahead < CAP_AHEAD * end.radius)
     near &= beside < (CAP_WIDTH * end.radius) ** 2
     facing = np.maximum(evidence.normals[near] @ end.outward, 0)
     return float(evidence.areas[near] @ facing / (np.pi * end.radius**2))

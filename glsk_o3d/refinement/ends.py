@@ -15,13 +15,12 @@ from ..numerics.polylines import arc_lengths, place_at
 from ..numerics.vectors import TINY, Floats, cross, dot, norm, unit
 from ..skeleton import NOT_MEASURED, Skeleton
 from .axis_fit import axis_box
+from .limbs import AXIS_LENGTH
 from .sections import Sections, VertexPoints, measure_sections
 
 END_CUT = 1.75  # fitted: distance from where the points stop, in larger half widths, within which a cap bends the curve
-END_RUN = 2.0  # fitted: radii behind the cut over which the direction of a limb is taken
 END_SIZE = 4.0  # fitted: radii behind the cut over which it is seen how wide a limb is, and how fast it gets thinner
 END_REACH = 0.98  # fitted: share of an end's points within its reach: normals and noise throw the others farther
-END_WINDOW = 1.25  # fitted: radii before the reach from which on points say where the limb stops
 END_BENDING = 0.5  # fitted: weight of going straight on, twice lambda
 END_ROUNDS = 3  # measured: from then on hardly anything moves
 END_LEFT = 0.25  # fitted: share of a branch from a junction that is left, at least, to say where it leads
@@ -102,7 +101,7 @@ def _grow(cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int,
     stop = np.clip(along[np.argmax(late)] if late.any() else length, length / 2, length)
     for _ in range(2):  # how far the points reach is seen along a run that is no part of the cap itself
         radius, wide = np.median(radii[run]), np.median(half_widths[run])
-        start = max(stop - END_RUN * radius, 0)
+        start = max(stop - AXIS_LENGTH * radius, 0)
         way, anchor = _way(places, along, start, stop), place_at(places, along, stop)
         # the points of a junction are other limbs', too
         own = cloud.members.of(path[max(np.searchsorted(along, start), 0 if other else 1) :])
@@ -116,7 +115,7 @@ def _grow(cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int,
         run = _within(along, stop, END_SIZE * radius)
     radius, anchor = np.median(radii[run]), places[cut - 1]
     if stop > radius / 2:  # of a stub there is no run: it goes on as it was
-        way = _way(places, along, max(stop - END_RUN * radius, 0), stop)
+        way = _way(places, along, max(stop - AXIS_LENGTH * radius, 0), stop)
     own = cloud.members.of(path[max(cut - 2, 0 if other else min(1, len(path) - 1)) :])
     points = cloud.points[own] - anchor
     ahead = points @ way > 0
@@ -172,7 +171,7 @@ class _Taper(NamedTuple):
         # a run shorter than its radius says nothing
         slope = (away @ radii) / spread if len(along) > 3 and np.ptp(along) > radius else 0.0
         slope = float(np.clip(slope, -1, 0))
-        return cls(radius * (1 + slope * END_RUN / 2), slope)
+        return cls(radius * (1 + slope * AXIS_LENGTH / 2), slope)
 
     def at(self, length: float) -> float:
         return max(self.radius + self.slope * length, 0.0)
@@ -253,7 +252,7 @@ class _End(NamedTuple):
         missing of the cap, of an open pipe all of it, counts as if it were where the sides stop: twice as far as their
         mean.
         """
-        start = max(reach - END_WINDOW * taper.at(reach - taper.radius), 0.0)
+        start = max(reach - taper.at(reach - taper.radius), 0.0)
         late = self.length > start
         if late.sum() < END_POINTS:
             return max(reach - taper.at(reach) / 2, 0.0)

@@ -9,8 +9,8 @@ import numpy as np
 from ..numerics.polylines import arc_lengths, place_at, relative_distance
 from ..numerics.vectors import TINY, dot
 from ..skeleton import Skeleton
-from .axis_fit import axis_box
-from .limbs import AXIS_LEAVES, AXIS_LENGTH, MEETING_STAY, Limbs
+from .axis_fit import FIT_STAY, axis_box
+from .limbs import AXIS_LEAVES, AXIS_LENGTH, Limbs
 from .merging import merge_into, with_fields
 from .sections import VertexPoints
 
@@ -193,8 +193,8 @@ def meet(
     spread, noise = np.array([(line.spread, line.bend / line.radius + LINE_NOISE) for line in known]).reshape(-1, 2).T
     across = np.eye(3) - way[:, :, None] * way[:, None]
     for _ in range(MEETING_ROUNDS):
-        matrix, right = np.diag([MEETING_STAY] * 3 + [1e-6]), np.zeros(4)
-        right[:3] = MEETING_STAY * (near - place)
+        matrix, right = np.diag([FIT_STAY] * 3 + [1e-6]), np.zeros(4)
+        right[:3] = FIT_STAY * (near - place)
         right[3] = 1e-6 * touching
         offset = middle - place
         ahead = dot(offset, way)

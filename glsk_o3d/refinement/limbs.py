@@ -9,13 +9,12 @@ from ..numerics.groups import component_labels, quantile
 from ..numerics.polylines import arc_lengths, place_at, relative_distance
 from ..numerics.vectors import TINY, dot, norm
 from ..skeleton import Skeleton
+from .axis_fit import FIT_STAY
 from .sections import VertexPoints
 
 # All fitted.
 AXIS_LEAVES = 1.3  # distance from the other limbs, over that from them to the surface, where half a limb is undisturbed
-AXIS_LENGTH = 2.5  # radii from there over which its line is taken
-AXIS_SHORT = 2.0  # length in radii, from each junction, below which a branch has no undisturbed place
-MEETING_STAY = 0.1  # weight of where a junction was: lines that are nearly one, or of a straight tube, meet anywhere
+AXIS_LENGTH = 2.0  # radii from there, or from where an end is cut, over which its line is taken
 
 
 class Limbs:
@@ -23,7 +22,8 @@ class Limbs:
 
     The `surface` (M,) is as far from every vertex; without points, its radius. Of every branch there is the `radius`
     (B,), the median of that along it; whether it is `inner` (B,), between two junctions; and whether it is `short`
-    (B,), so that the contraction disturbs it all along, if they are to be `joined`: what short inner branches join is
+    (B,), no longer than a radius from each junction, so that the contraction disturbs it all along, if they are to be
+    `joined`: what short inner branches join is
     one `region` (M,), else every vertex by itself. The `paths` lead from every junction along its branches; `branch`
     has the number of the branch of each, and `at` those that start in a region.
     """
@@ -37,7 +37,7 @@ class Limbs:
         self.radius = np.array([quantile(self.surface[branch]) for branch in self.branches], float)
         self.inner = (degree[ends] > 2).all(axis=1) & (ends[:, 0] != ends[:, 1])
         length = np.array([arc_lengths(self.vertices[branch])[-1] for branch in self.branches], float)
-        self.short = joined & (length < AXIS_SHORT * self.radius * np.where(self.inner, 2, 1))
+        self.short = joined & (length < self.radius * np.where(self.inner, 2, 1))
         self.region = np.arange(len(degree))
         if joined:
             self.region = component_labels(len(degree), ends[self.short & self.inner])
@@ -84,7 +84,7 @@ class Limbs:
         long = ~self.short[[self.branch[limb] for limb in limbs]]
         say = long if long.sum() > 1 else np.ones(len(long), bool)
         across = say[:, None, None] * (np.eye(3) - way[:, :, None] * way[:, None])
-        weight = across.sum(axis=0) + MEETING_STAY * np.eye(3)
+        weight = across.sum(axis=0) + FIT_STAY * np.eye(3)  # lines that are nearly one meet anywhere
         place = near + np.linalg.solve(weight, np.einsum("kij,kj->i", across, anchor - near))
         along = dot(place - anchor, way)
         fits = norm(place - anchor - along[:, None] * way) <= radius.max()

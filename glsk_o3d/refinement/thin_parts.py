@@ -6,17 +6,16 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from ..numerics.eigen import largest_eigenvalue
-from ..numerics.grid_sampling import sample_cloud
+from ..numerics.grid_sampling import SAMPLED_POINTS, sample_cloud
 from ..numerics.groups import component_labels, first_in_their_place, group_sum
 from ..numerics.near_links import link_growth, near_links
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.vectors import COLUMNS, ROWS, TINY
+from ..numerics.winding import AREA_NEIGHBOURS
 from ..skeleton import Skeleton
 from .diagnostics import SHEET_SHARE
 from .sections import VertexPoints
 
-SCALE_NEIGHBOUR = 8  # fitted: the nearest point whose distance is the scale of a point
-TRACED_POINTS = 100_000  # measured: points that larger clouds are traced by, about; with fewer, thick parts look thin
 SAME_PLACE = 1e-6  # derived: share of the cloud's extent below which points are not apart
 LEAST_POINTS = 64  # fitted: of which fewer say nothing about where there is no surface
 SURFACE_GROWTH = 2.5  # measured: growth of links on a surface; noise that fills space has more, a curve 1.7
@@ -39,7 +38,7 @@ class SpacedPoints(VertexPoints):
         """Which input points they are."""
         points, some = self.skeleton.points, np.flatnonzero(self.skeleton.vertex_of_point >= 0)
         if len(some):
-            some = some[sample_cloud(points[some], TRACED_POINTS)[0]]
+            some = some[sample_cloud(points[some], SAMPLED_POINTS)[0]]
         wide = np.ptp(points[some], axis=0).max() if len(some) else 0.0
         return some[first_in_their_place(np.rint(points[some] / max(SAME_PLACE * wide, TINY)))]
 
@@ -51,7 +50,7 @@ class SpacedPoints(VertexPoints):
     @cached_property
     def away(self) -> np.ndarray:
         """Distances to the nearest points, from the point itself to the one that gives the scale."""
-        return nearest_neighbours(self.points, min(SCALE_NEIGHBOUR + 1, len(self.points)))[0]
+        return nearest_neighbours(self.points, min(AREA_NEIGHBOURS + 1, len(self.points)))[0]
 
     @property
     def scale(self) -> np.ndarray:
@@ -84,7 +83,7 @@ def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
 def may_lack_surface(skeleton: Skeleton, least: float) -> bool:
     """Whether vertices that are not sure where the axis is have so many points that one region may lack a surface."""
     owner, m = skeleton.vertex_of_point[skeleton.vertex_of_point >= 0], len(skeleton.vertices)
-    count = np.bincount(owner, minlength=m) / max(len(owner) / TRACED_POINTS, 1)
+    count = np.bincount(owner, minlength=m) / max(len(owner) / SAMPLED_POINTS, 1)
     return bool(count[skeleton.confidence < UNSURE_CONFIDENCE].sum() > (1 - least) * min(REGION_POINTS, count.sum()))
 
 
