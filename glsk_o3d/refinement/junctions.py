@@ -58,7 +58,7 @@ def move_junctions(skeleton: Skeleton) -> Skeleton:
         With other places of the junctions and of the vertices beside them, perhaps fewer.
     """
     while len(skeleton.junctions):
-        limbs = Limbs(skeleton, joined=False)
+        limbs = Limbs(skeleton)
         places = _places(skeleton, limbs)
         merged = _merged(skeleton, limbs, places)
         if merged is None:

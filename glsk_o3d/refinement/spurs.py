@@ -88,7 +88,7 @@ class _Twig(NamedTuple):
 
 
 def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
-    limbs, degree = Limbs(skeleton, joined=True), skeleton.degree
+    limbs, degree = Limbs(skeleton), skeleton.degree
     paths = enumerate(branch[::-1] if degree[branch[0]] == 1 else branch for branch in limbs.branches)
     found = [(k, path) for k, path in paths if degree[path[0]] > 2 and degree[path[-1]] == 1]
     if not found:
@@ -182,14 +182,13 @@ def _standing_out(limbs: Limbs, k: int, junction: int, points: np.ndarray, endin
     """How far the points of branch k stand out of the surface around the other limbs."""
     if len(points) == 0:
         return 0.0
-    around = [i for i in limbs.at[limbs.region[junction]] if limbs.branch[i] != k]
-    beside = [i for i in around if limbs.paths[i][0] == junction]
+    around = [i for i in limbs.at[junction] if limbs.branch[i] != k]
     anchor, foot, fits = limbs.meeting(around, limbs.vertices[junction])
-    longer = np.flatnonzero(fits & ~limbs.short[[limbs.branch[i] for i in around]])
+    longer = np.flatnonzero(fits)
     radius = limbs.radius[[limbs.branch[around[i]] for i in longer]]
     surface = np.where(ending, np.minimum(limbs.surface, limbs.surface[junction]), limbs.surface)
     vertices = np.concatenate([limbs.vertices, anchor[longer], foot[longer]])
     more = len(limbs.vertices) + np.arange(2 * len(longer)).reshape(2, -1).T
-    paths = [*(limbs.paths[i] for i in beside), *more]
+    paths = [*(limbs.paths[i] for i in around), *more]
     ratio, there = relative_distance(points, vertices, np.r_[surface, radius, radius], paths)
     return quantile((ratio - 1) * there, SPUR_QUANTILE)
