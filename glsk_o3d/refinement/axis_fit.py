@@ -14,7 +14,7 @@ from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.polylines import incident_edges, nearest_on_edges, places_on_edges
 from ..numerics.radii import flatness, plane_distance_radii, robust_radii
 from ..numerics.solver import factorised
-from ..numerics.vectors import COLUMNS, FULL, ROWS, TINY, Floats, box, cross, dot, norm, unit
+from ..numerics.vectors import COLUMNS, FULL, ROWS, TINY, Floats, Ints, box, cross, dot, norm, unit
 from ..skeleton import NOT_MEASURED, Skeleton
 from .evidence import SurfaceGraph
 from .merging import with_fields
@@ -101,7 +101,7 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
         onto = nearest_on_edges(x, ends, edges_at[vertex], p) if again else (near.edge, near.share[:, 1])
         place = smooth(places_on_edges(x, ends, *onto), FIT_DIFFUSION * near.width[vertex])
         vertex, edge, t = _walked(x, ends, edges_at, vertex, place)
-        near = _nearest(x, ends, edge, t, p, n, skeleton.radii)
+        near = _nearest(x, ends, edge, t, p, n, skeleton.radii, sides=settle)
         x = _solve(x, near, p, pattern, settle)
         # normals that mean nothing may meet anywhere
         x = np.where(skeleton.degree[:, None] > 0, np.clip(x, low, high), x)
@@ -177,12 +177,12 @@ class _Nearest(NamedTuple):
     width: np.ndarray  # half of the section's, at every vertex
     flat: np.ndarray  # how flat its points lie, and its normals say that they do: 0 around a tube, 1 on a sheet
     faces: np.ndarray  # (m, 6) different entries of the sum of n n^T, at every vertex and its neighbours
-    # (m, 12) that of outward normals n, of h n, and of h^2 n n^T, with h from the curve to the plane
+    # (m, 12) that of outward normals n, of h n, and of h^2 n n^T, with h from the curve to the plane; or nothing
     outward: np.ndarray
 
 
 def _nearest(
-    x: np.ndarray, ends: np.ndarray, edge: np.ndarray, t: np.ndarray, p: np.ndarray, n: np.ndarray, radii: np.ndarray
+    x: Floats, ends: Ints, edge: Ints, t: Floats, p: Floats, n: Floats, radii: Floats, sides: bool = False
 ) -> _Nearest:
     """What every point is to a place of the curve; the radii are half axes in directions nobody saw."""
     share, tangent = np.column_stack([1 - t, t]), unit(x[ends[:, 1]] - x[ends[:, 0]])
@@ -191,11 +191,11 @@ def _nearest(
     miss, apart = dot(across, offset) ** 2, dot(offset, offset) - dot(offset, along) ** 2
     a, b = ends.T
     aside = offset - dot(offset, along)[:, None] * along
-    squares = aside[:, ROWS] * aside[:, COLUMNS]
-    inward, moments = dot(n, offset)[:, None], normal_moments(n, offset)
-    outward = np.concatenate([-np.sign(inward) * n, -inward * n, inward**2 * moments[:, :6]], axis=1)
-    facts = np.column_stack([miss, apart, np.full(len(p), 0.5), moments, squares, outward])
-    at = group_sum(facts, edge, len(ends))
+    facts = [miss, apart, np.full(len(p), 0.5), normal_moments(n, offset), aside[:, ROWS] * aside[:, COLUMNS]]
+    if sides:
+        inward = dot(n, offset)[:, None]
+        facts += [-np.sign(inward) * n, -inward * n, inward**2 * facts[3][:, :6]]
+    at = group_sum(np.column_stack(facts), edge, len(ends))
     at = group_sum(np.concatenate([at, at]), np.concatenate([a, b]), len(x))
     at = at + group_sum(at[np.concatenate([b, a])], np.concatenate([a, b]), len(x))
     miss_at, apart_at, support = at[:, :3].T

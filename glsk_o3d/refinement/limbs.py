@@ -22,8 +22,7 @@ class Limbs:
 
     The `surface` (M,) is as far from every vertex; without points, its radius. Of every branch there is the `radius`
     (B,), the median of that along it, and whether it is `inner` (B,), between two junctions. The `paths` lead from
-    every junction along its branches; `branch` has the number of the branch of each, and `at` those that start at a
-    junction.
+    every junction along its branches, those `at` it; `branch` has the number of the branch of each.
     """
 
     def __init__(self, skeleton: Skeleton) -> None:

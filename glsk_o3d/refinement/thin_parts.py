@@ -52,11 +52,6 @@ class SpacedPoints(VertexPoints):
         """Distances to the nearest points, from the point itself to the one that gives the scale."""
         return nearest_neighbours(self.points, min(AREA_NEIGHBOURS + 1, len(self.points)))[0]
 
-    @property
-    def scale(self) -> np.ndarray:
-        """The distance to the eighth nearest point."""
-        return self.away[:, -1]
-
 
 def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
     """Vertices around which the cloud shows no surface, (M,) bool array.

@@ -84,7 +84,7 @@ class _Mixed:
     def of(cls, skeleton: Skeleton, cloud: SpacedPoints, thin: np.ndarray) -> _Mixed:
         some, scale = np.empty(0, int), 0.0
         if thin.any():
-            scale = float(np.median(cloud.scale))
+            scale = float(np.median(cloud.away[:, -1]))
             piece = connected_components(cloud.links, directed=False)[1]
             floats = cloud.away[:, min(LEAST_PIECE - 1, cloud.away.shape[1] - 1)] > JOIN_SCALES * scale
             floats &= (np.bincount(piece) < LEAST_PIECE)[piece]
