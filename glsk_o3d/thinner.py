@@ -15,7 +15,7 @@ from .pipeline import Filter, Watch
 from .points import Points, default_k
 
 ASK_AGAIN = 0.25  # speed: share of the points left, below which the neighbours are looked up anew
-ENOUGH = 2400  # fitted: points on a body without thin parts
+ENOUGH = 2400  # fitted: points on a body without thin parts; fewer are not merged
 PACKED = 0.42  # measured: points left on an area of 1 if none are to be nearer than 1
 SMOOTHING = 8  # fitted: steps over which the thickness of parts is averaged
 LEAST_MERGED = 0.001  # measured: share of the points that a round must merge: along a spiral it is one each

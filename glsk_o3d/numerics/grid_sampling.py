@@ -11,7 +11,7 @@ from .morton import FINEST_CELLS, MORTON_BITS, morton_codes, sort_within
 from .vectors import dot
 
 GRID_TAIL = 0.001  # fitted: share of the points that may be far off, at either end of each axis
-SAMPLED_POINTS = 100_000  # measured: points by which that is told, or what has a surface: of fewer too little has
+SAMPLED_POINTS = 100_000  # measured: points by which that is told, and parts traced; with fewer, thick ones look thin
 # derived: odd numbers with bits everywhere, by which coordinates are mixed
 MIXING = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
 ALL_BITS = np.uint64(2**64 - 1)  # derived

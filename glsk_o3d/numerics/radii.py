@@ -51,11 +51,7 @@ def robust_radii(
     m = len(planes)
     count = np.bincount(vertex, minlength=m)
     shares = group_sum(normals[:, ROWS] * normals[:, COLUMNS], vertex, m) / np.maximum(count, 1)[:, None]
-    weight: Floats = np.where(count > 0, np.sqrt(doubt) * (1 - flatness(shares)), 0)
-    return (1 - weight) * planes + weight * group_median(distance, vertex, m)
-
-
-def flatness(shares: np.ndarray) -> np.ndarray:
-    """The flatness of `robust_radii` from means of n n^T, by their six different entries, (M,) from (M, 6)."""
     # (a - b)^2 = 2 (a^2 + b^2) - 1
-    return np.sqrt(np.clip(2 * shares**2 @ TIMES - 1, 0, 1))
+    flat = np.sqrt(np.clip(2 * shares**2 @ TIMES - 1, 0, 1))
+    weight: Floats = np.where(count > 0, np.sqrt(doubt) * (1 - flat), 0)
+    return (1 - weight) * planes + weight * group_median(distance, vertex, m)

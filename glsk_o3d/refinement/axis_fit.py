@@ -12,7 +12,7 @@ from scipy.sparse import bsr_array, csc_array
 from ..numerics.groups import group_sum
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.polylines import incident_edges, nearest_on_edges, places_on_edges
-from ..numerics.radii import flatness, plane_distance_radii, robust_radii
+from ..numerics.radii import plane_distance_radii, robust_radii
 from ..numerics.solver import factorised
 from ..numerics.vectors import COLUMNS, FULL, ROWS, TINY, Floats, Ints, box, cross, dot, norm, unit
 from ..skeleton import NOT_MEASURED, Skeleton
@@ -23,7 +23,7 @@ from .sections import Sections, VertexPoints, half_axes, measure_sections, norma
 FIT_DIFFUSION = 0.6  # fitted: length over which the places of points are smoothed on the surface, over the half width
 FIT_SPREAD = 2**0.5  # fitted: half width where normals say nothing, over that of the points; 1 lets noise bend it
 FIT_WIDEST = 10.0  # fitted: half width over the spacing of the vertices, at most: those in one place have none
-FIT_STAY = 0.1  # fitted: weight of staying where it was, per point; of a junction, per line
+FIT_STAY = 0.1  # fitted: weight of staying where it was, per point; of a junction, over that of one line
 FIT_CENTROID = 0.5  # fitted: weight of the points themselves where their normals say nothing
 # derived: share of the squared normals of a quarter of a tube that stand across the others: of less, they do not say
 FIT_OPEN = 1 / 2 - 1 / np.pi  # how deep behind them the axis is; of half a tube it is .5
@@ -31,7 +31,7 @@ FIT_SIDES = 20.0  # fitted: weight of the sides of a flat section; with 10 and 3
 FIT_WALK = 3  # measured: vertices by which a point may move along the curve in a pass
 # derived: over the diagonal, how far out of the box of its points an axis may be: they show a third of a tube at least,
 FIT_BEYOND = 0.05  # whose axis is half a radius away from it, and a tube that is seen so is some ten radii long
-HALF_SUPPORT = 8  # fitted: points that support a vertex half; an edge is cut into a piece at most for each so many
+HALF_SUPPORT = 8  # fitted: points that support a vertex half; an edge has a piece for so many, begun ones counted
 # the axis of half a tube is 2 / pi radii away from the mean of its points, which scatter around that by their standard
 # deviation; no axis is farther off
 HALF_TUBE_REACH = (2 / np.pi) / np.sqrt(1 - (2 / np.pi) ** 2)
@@ -77,11 +77,9 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
     both sides of a flat section were seen, they say where the middle of its width is: the face of a plate that goes on
     into another bar says it wrongly. See `_middle`.
 
-    The confidence is (1 - d) s with s = c / (c + 8), where c counts over the vertex and its neighbours. Of a settled
-    curve d is times :math:`1 - s \varphi (1 - \tau)`, with the flatness :math:`\varphi` of `robust_radii`, where the
-    points spread :math:`\tau` times as far along the thickness of the section as along its width: the normals of a flat
-    one do not say where the middle is, but its points do. The radii are those of circles with the area of the section,
-    see `robust_radii`, or without passes `plane_distance_radii`. Points belong to the vertex nearest to their place.
+    The confidence is (1 - d) c / (c + 8), where c counts over the vertex and its neighbours. The radii are those of
+    circles with the area of the section, see `robust_radii`, or without passes `plane_distance_radii`. Points belong to
+    the vertex nearest to their place.
     """
     m, ends = len(skeleton.vertices), skeleton.edges
     points, owner = skeleton.supporting_points, skeleton.vertex_of_point.copy()
@@ -112,8 +110,7 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
     if passes:  # the distance from a curve that nobody has centred is no radius
         equal = np.where(near.support > 0, near.sections.radius, radii)
         radii = robust_radii(equal, norm(near.offset), near.doubt, n, vertex)
-    sure = near.support / (near.support + HALF_SUPPORT)
-    confidence = sure * (1 - near.doubt * (1 - sure * near.flat * settle))
+    confidence = (1 - near.doubt) * near.support / (near.support + HALF_SUPPORT)
     return with_fields(skeleton, vertices=x + centre, confidence=confidence, radii=radii, vertex_of_point=owner)
 
 
@@ -175,7 +172,6 @@ class _Nearest(NamedTuple):
     support: np.ndarray  # points at every vertex and its neighbours
     sections: Sections  # at every vertex
     width: np.ndarray  # half of the section's, at every vertex
-    flat: np.ndarray  # how flat its points lie, and its normals say that they do: 0 around a tube, 1 on a sheet
     faces: np.ndarray  # (m, 6) different entries of the sum of n n^T, at every vertex and its neighbours
     # (m, 12) that of outward normals n, of h n, and of h^2 n n^T, with h from the curve to the plane; or nothing
     outward: np.ndarray
@@ -204,10 +200,9 @@ def _nearest(
     # normals that point anywhere explain half of the distance; without points there is nothing but doubt
     doubt = np.where(apart_at > 0, np.minimum(2 * miss_at, apart_at) / np.maximum(apart_at, TINY), 1)
     # normals of a sheet as thin as its points are apart say nothing of its width, and there is nothing but doubt
-    spread, flat = _spread(at[:, 15:21] / np.maximum(2 * support, TINY)[:, None])
-    flat = flat * flatness(at[:, 3:9] / np.maximum(at[:, 3:9] @ (ROWS == COLUMNS), TINY)[:, None])
+    spread = _spread_width(at[:, 15:21] / np.maximum(2 * support, TINY)[:, None])
     width = sections.half_width + doubt * np.maximum(FIT_SPREAD * spread - sections.half_width, 0)
-    return _Nearest(edge, share, tangent, across, offset, doubt, support, sections, width, flat, at[:, 3:9], at[:, 21:])
+    return _Nearest(edge, share, tangent, across, offset, doubt, support, sections, width, at[:, 3:9], at[:, 21:])
 
 
 def _pull(near: _Nearest) -> np.ndarray:
@@ -245,14 +240,14 @@ def _middle(near: _Nearest) -> tuple[np.ndarray, np.ndarray]:
     return firm, np.clip(way, -firm * width, firm * width)
 
 
-def _spread(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    r"""Half width of sections by their points, and how flat these lie, (m,), from second moments around the axis.
+def _spread_width(moments: np.ndarray) -> np.ndarray:
+    r"""Half width of sections by their points: from second moments around the axis, (m, 6) float array.
 
     With the eigenvalues a >= b across the limb it is :math:`\sqrt{a (3 - b / a)}`: exact around a circle, where a = b =
-    r^2 / 2, also for half of one, and on a flat strip, where a = w^2 / 3. They lie as flat as :math:`1 - \sqrt{b / a}`.
+    r^2 / 2, also for half of one, and on a flat strip, where a = w^2 / 3.
     """
-    _, less, most = np.maximum(np.linalg.eigvalsh(moments[:, FULL]), 0).T
-    return np.sqrt(3 * most - less), 1 - np.sqrt((less + TINY) / (most + TINY))
+    _, less, most = np.linalg.eigvalsh(moments[:, FULL]).T
+    return np.sqrt(np.maximum(3 * most - np.clip(less, 0, most), 0))
 
 
 def _solve(x: np.ndarray, near: _Nearest, p: np.ndarray, pattern: _Pattern, settle: bool) -> np.ndarray:

@@ -20,7 +20,7 @@ BRIDGE_COSINE = 0.5  # least cosine between the bridge and the end
 BRIDGE_LOOK_BACK = 3.0  # radii to look back along a branch for its direction
 DETOUR = 3.0  # least way along the skeleton over that across the gap; less would make a loop of nothing
 BRIDGE_SAMPLES = np.arange(1, 8)[:, None] / 8  # derived: places along a bridge, evenly
-CAP_AHEAD, CAP_WIDTH = 2.5, 1.6  # radii from an end, and one back, in which its cap is
+CAP_AHEAD, CAP_WIDTH = 2.5, 1.6  # radii ahead of an end, and aside, in which its cap is; behind it one radius
 
 
 class _End(NamedTuple):

@@ -17,7 +17,7 @@ BALL_SPREAD = 0.5
 # to 3
 STUB_LENGTH = 3.3
 MAJORITY = 0.5  # derived: of the points, from which on a cloud is called what they are
-LOW_CONFIDENCE = 0.2  # warning: below which a vertex is not to be trusted
+LOW_CONFIDENCE = 0.1  # warning: below which a vertex is not to be trusted
 LOW_CONFIDENCE_SHARE = 0.25  # warning: of the points around such vertices that is worth a warning
 
 REASONS = ("sheet-like", "sphere-like", "no edges", "uncertain topology", "weakly supported")

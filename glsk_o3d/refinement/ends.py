@@ -42,9 +42,10 @@ def regrow_ends(skeleton: Skeleton) -> Skeleton:
     r"""Cut every end where a cap may have bent it, and let it grow along its limb to where this stops.
 
     Contraction draws the end of a limb into an edge or a corner of the face that closes it, and the fit follows, since
-    the normals of a cap do not say where the axis is. So vertices within 1.75 half widths of where the points stop, and
-    those within their own half width of the last one, are cut. The limb goes on in the direction t of the two radii
-    behind, with the turn d and the bend k, across t, that the normals n of its sides ask for:
+    the normals of a cap do not say where the axis is. So vertices are cut that are in a corner, see `_last`, or within
+    1.75 half widths of where the points stop, or within their own half width of the last one. The limb goes on in the
+    direction t of the two radii behind, with the turn d and the bend k, across t, that the normals n of its sides ask
+    for:
 
     .. math:: \sum_p w \left((b \cdot (s (t + d) + s^2 k / 2 - p))^2 + \lambda (s^2 |d|^2 + s^4 |k|^2 / 4)\right),
         \quad b = n \times t
@@ -93,7 +94,7 @@ def _grow(cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int,
     """Cut the end of a path, and let it grow anew; None if too few points say where."""
     places, radii, half_widths = cloud.skeleton.vertices[path], sections.radius[path], sections.half_width[path]
     along = arc_lengths(places)
-    last = _last(cloud, path, along, first)
+    last = _last(cloud, path, along, first, other)
     length = along[last]
     run, cut, way = _within(along, length, END_SIZE * np.median(radii)), len(path), np.zeros(3)
     late = (length - along <= half_widths) & (other | (along >= half_widths))
@@ -125,23 +126,25 @@ def _grow(cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int,
     behind = _within(along, stop, END_SIZE * radius)
     tip, thick = end.tip(_Taper.of(along[behind] - stop, radii[behind], radius))
     steps = np.diff(along[run])
-    step = np.median(steps) if len(steps) else length / (len(path) - 1)
+    step = np.median(steps) if len(steps) else length / last
     tip = max(tip, step / 2)
     # edges of no length are those of no limb
     number = max(round(min(tip / max(step, TINY), len(points))), 1)
     return _Grown(path, cut, anchor + end.curve(np.arange(1, number + 1) / number * tip), path[run], thick)
 
 
-def _last(cloud: VertexPoints, path: np.ndarray, along: np.ndarray, first: int) -> int:
-    """Number along a path of the last vertex that is not bent into a corner, to beside points of others.
+def _last(cloud: VertexPoints, path: np.ndarray, along: np.ndarray, first: int, other: bool) -> int:
+    """Number along a path of the last vertex before the curve is drawn into a corner.
 
-    Those behind it have hardly any point. The part of them is no longer than what a cap bends.
+    The vertices after it have at most a fiftieth of the branch's points, without those of a junction, and are no longer
+    than what a cap bends.
     """
-    own = cloud.members.of(path)
+    count = cloud.count[path] * (other | (np.arange(len(path)) > 0))
+    own = cloud.members.of(path[count > 0])
     thick = np.sqrt((cloud.offset[own] ** 2).sum() / max(len(own), 1))
-    some = np.cumsum(cloud.count[path][::-1])[::-1] > (1 - END_REACH) * len(own)
+    some = np.cumsum(count[::-1])[::-1] > (1 - END_REACH) * len(own)
     least = np.searchsorted(along, along[-1] - END_CUT * thick)
-    return int(max(np.flatnonzero(some).max(initial=0), least, min(first, len(path) - 1)))
+    return int(max(np.flatnonzero(some).max(initial=0), least, first))
 
 
 def _within(along: np.ndarray, stop: float, length: float) -> np.ndarray:
