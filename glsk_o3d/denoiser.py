@@ -15,7 +15,6 @@ from .numerics.vectors import PAIRS
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .points import Points, default_k
-from .thinner import STEADY_SHARE
 
 RIDGE_NEIGHBOURS = 32  # fitted: among which a ridge is sought: more than for rings, a noisy shell is thick
 RIDGE_CHUNK = 1024  # speed: points at a time: the (3, points, 32) work arrays then stay in the cache
@@ -67,7 +66,7 @@ def averaged(points: Points) -> Points:
     """Points with means in the place of noisy ones, while there are plenty of these."""
     while np.count_nonzero(points.noise) >= 2 * ENOUGH_NOISY:
         row, mean, weight = average_noisy(points.cloud, points.neighbours, points.noise, points.weight, ENOUGH_NOISY)
-        if len(mean) > STEADY_SHARE * len(row):
+        if 2 * len(mean) > len(row):
             break
         neighbours = nearest_neighbours(mean, default_k(len(mean)))[1]
         points = points.remade(row, mean, neighbours, weight=weight, merged=np.bincount(row, points.merged))

@@ -24,7 +24,6 @@ LEAST_AROUND = 3  # derived: points around the thinnest part
 WIDER_STEPS = 3  # measured: steps from neighbour to neighbour: fewer see no more than noise, more see other parts
 SHEET_FROM = 0.4  # measured: second over third variance of these, from which on they are a sheet; tubes of 10 have it
 WIDER_BIAS = 1.25  # measured: on tubes with 18 to 80 points around them, noise of up to a fifth of their spacing
-STEADY_SHARE = 0.9  # fitted: share of the points left by a pass at which passes end
 
 
 def default_size(n: int) -> int:
@@ -78,7 +77,7 @@ class Thinner(Filter[Points]):
         if self.thin_to == "all":
             return points
         before = np.inf
-        while self.around and DENSE_FROM <= len(points) <= STEADY_SHARE * before:
+        while self.around and DENSE_FROM <= len(points) <= before / 2:
             before, here = len(points), points.cloud[points.survivors]
             apart = spacing_enough(here, points.neighbours, points.spread, self.around)
             points = _merged(points, thin_nearer(here, points.neighbours, apart))
