@@ -20,7 +20,7 @@ from .skeleton import Skeleton
 
 ANSWERS = {"loop": close_loops, "limb": prune_spurs, "air": cut_air, "gap": bridge_gaps}
 ORDER_OF_QUESTIONS = ("loop", "limb", "air", "limb", "gap", "loop", "limb")
-"""Whether there are false loops and spurs is asked last, since cuts and bridges may make them."""
+"""Spurs are asked about again after cuts and bridges, which may make them, and loops if bridges made more of them."""
 
 
 @documented
@@ -111,15 +111,19 @@ class Refiner(Filter[Skeleton]):
         return self._centred(skeleton, surface), surface
 
     def _decide(self, skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
-        """Answer one question after the other; not again where the graph is the same as before."""
+        """Answer one question after the other; not again where the graph is the same, or has no more loops."""
         evidence = Evidence.of(skeleton, surface)
         decisions: dict[str, list[Decision]] = {about: [] for about in ANSWERS}
         settled: dict[str, Skeleton] = {}  # what each question was last asked about
+        n_handles = 0
         for about in ORDER_OF_QUESTIONS:
-            if settled.get(about) is not skeleton:
-                skeleton, found = self._asked(about, skeleton, evidence)
-                decisions[about] = _changed(decisions[about]) + found
-                settled[about] = skeleton
+            if settled.get(about) is skeleton or (about == "loop" and skeleton.n_loops <= n_handles):
+                continue
+            skeleton, found = self._asked(about, skeleton, evidence)
+            decisions[about] = _changed(decisions[about]) + found
+            settled[about] = skeleton
+            if about == "loop":
+                n_handles = skeleton.n_loops
         report = replace(
             skeleton.report,
             decisions=tuple(each for found in decisions.values() for each in found),

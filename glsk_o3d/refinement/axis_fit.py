@@ -77,9 +77,10 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
     both sides of a flat section were seen, they say where the middle of its width is: the face of a plate that goes on
     into another bar says it wrongly. See `_middle`.
 
-    The confidence is (1 - d) c / (c + 8), where c counts over the vertex and its neighbours. The radii are those of
-    circles with the area of the section, see `robust_radii`, or without passes `plane_distance_radii`. Points belong to
-    the vertex nearest to their place.
+    The confidence is (1 - d) c / (c + 8), where c counts over the vertex and its neighbours; where the curve settles,
+    at least that of a section with two flat sides, see `_flat_doubt`. The radii are those of circles with the area of
+    the section, see `robust_radii`, or without passes `plane_distance_radii`. Points belong to the vertex nearest to
+    their place.
     """
     m, ends = len(skeleton.vertices), skeleton.edges
     points, owner = skeleton.supporting_points, skeleton.vertex_of_point.copy()
@@ -94,7 +95,8 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
     low, high = axis_box(p)
     near = _nearest(x, ends, *nearest_on_edges(x, ends, edges_at[vertex], p), p, n, skeleton.radii)
     if passes:
-        smooth = _smoother(surface or SurfaceGraph.of(skeleton), points, p)
+        surface = surface or SurfaceGraph.of(skeleton)
+        smooth = _smoother(surface, points, p)
     for again in range(passes):
         onto = nearest_on_edges(x, ends, edges_at[vertex], p) if again else (near.edge, near.share[:, 1])
         place = smooth(places_on_edges(x, ends, *onto), FIT_DIFFUSION * near.width[vertex])
@@ -104,13 +106,15 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
         # normals that mean nothing may meet anywhere
         x = np.where(skeleton.degree[:, None] > 0, np.clip(x, low, high), x)
     if passes:
-        near = _nearest(x, ends, *nearest_on_edges(x, ends, edges_at[vertex], place), p, n, skeleton.radii)
+        onto = nearest_on_edges(x, ends, edges_at[vertex], place)
+        near = _nearest(x, ends, *onto, p, n, skeleton.radii, sides=settle)
         owner[points] = vertex
     radii = plane_distance_radii(x + centre, owner, skeleton.points, skeleton.normals, skeleton.radii)
     if passes:  # the distance from a curve that nobody has centred is no radius
         equal = np.where(near.support > 0, near.sections.radius, radii)
         radii = robust_radii(equal, norm(near.offset), near.doubt, n, vertex)
-    confidence = (1 - near.doubt) * near.support / (near.support + HALF_SUPPORT)
+    doubt = np.minimum(near.doubt, _flat_doubt(near, surface.spacing)) if passes and settle else near.doubt
+    confidence = (1 - doubt) * near.support / (near.support + HALF_SUPPORT)
     return with_fields(skeleton, vertices=x + centre, confidence=confidence, radii=radii, vertex_of_point=owner)
 
 
@@ -228,16 +232,45 @@ def _middle(near: _Nearest) -> tuple[np.ndarray, np.ndarray]:
     width, thickness, across = near.sections
     odd, distant = dot(near.outward[:, :3], across), dot(near.outward[:, 3:6], across)
     flat = 1 - thickness / np.maximum(width, TINY)
-    both = np.stack([near.faces, near.outward[:, 6:]])[:, :, FULL]
-    of_sides = np.einsum("mi,kmij,mj->km", across, both, across)
-    of_faces = np.trace(both, axis1=2, axis2=3) - of_sides
-    for half, sums in ((width, of_sides), (thickness, of_faces)):
-        normals, squares = np.maximum(sums, 0)  # rounding leaves less than nothing
+    for half, (normals, squares) in zip((width, thickness), _sides_and_faces(near), strict=True):
         flat *= np.clip(2 - squares / np.maximum(np.maximum(half**2 * normals, squares / 2), TINY), 0, 1) ** 2
-    seen = of_sides[0]
+    seen = _sides_and_faces(near)[0, 0]
     firm = flat * np.maximum(seen - np.abs(odd), 0)
     way = flat * seen * (distant - width * odd) / np.maximum(seen + np.abs(odd), TINY)
     return firm, np.clip(way, -firm * width, firm * width)
+
+
+def _sides_and_faces(near: _Nearest) -> np.ndarray:
+    """Sums of (n . e)^2 and of (h n . e)^2 in the direction of the width, and in that of the thickness, (2, 2, m)."""
+    across = near.sections.across
+    both = np.stack([near.faces, near.outward[:, 6:]])[:, :, FULL]
+    of_sides = np.einsum("mi,kmij,mj->km", across, both, across)
+    # rounding leaves less than nothing
+    found: np.ndarray = np.maximum(np.stack([of_sides, np.trace(both, axis1=2, axis2=3) - of_sides]), 0)
+    return found
+
+
+def _flat_doubt(near: _Nearest, spacing: float) -> np.ndarray:
+    r"""How little the points say of an axis in the middle of two flat sides, (m,): little doubt is left of a bar.
+
+    The planes of both sides are as far from the axis as the half width w and the half thickness t. It is
+
+    .. math:: 1 - (1 - v)\, (1 - |r| / c)\, t^2 / (t^2 + s^2).
+
+    v is the variance of their distances h around these, over :math:`w^2 + t^2`, and this over what normals that point
+    anywhere have, :math:`\pi^2 / 16 - 1 / 2`. The sum r of the outward normals over the sum c of their squares, both
+    across the width, says how far one side has more of them. Two sides nearer to each other than the points' spacing s
+    may be one, such as a table.
+    """
+    outward, (width, thickness, across) = near.outward[:, :3], near.sections
+    (of_sides, seen), (squares_of_sides, squares) = _sides_and_faces(near).transpose(1, 0, 2)
+    spread = squares_of_sides - width**2 * of_sides + squares - thickness**2 * seen
+    random = (np.pi**2 / 16 - 1 / 2) * (of_sides + seen) * (width**2 + thickness**2)
+    sure = 1 - np.clip(spread / np.maximum(random, TINY), 0, 1)
+    odd = norm(outward - dot(outward, across)[:, None] * across)
+    sure *= np.maximum(1 - odd / np.maximum(seen, TINY), 0)
+    doubt: np.ndarray = 1 - sure * thickness**2 / np.maximum(thickness**2 + spacing**2, TINY)
+    return doubt
 
 
 def _spread_width(moments: np.ndarray) -> np.ndarray:

@@ -38,10 +38,10 @@ def measured(skeleton: Skeleton) -> Skeleton:
 def diagnose(skeleton: Skeleton) -> list[str]:
     """Reasons not to trust a skeleton: the cloud is sheet-like, sphere-like, or does not say where much of the axis is.
 
-    Sheet-like: the normals around a vertex have one direction. Sphere-like: the normal lines of a whole component meet
-    in one point, or it is hardly longer than thick. All are scale-free and ask the cloud, not the skeleton. Of a cloud
-    that is neither, the parts with little confidence are named, and the least certain question about loops, air and
-    gaps. No edges at all are a reason, too.
+    Sheet-like: the normals around a vertex have one direction, and it has little confidence: a blade has two sides.
+    Sphere-like: the normal lines of a whole component meet in one point, or it is hardly longer than thick. All are
+    scale-free. Of a cloud that is neither, the parts with little confidence are named, and the least certain question
+    about loops, air and gaps. No edges at all are a reason, too.
     """
     cloud = VertexPoints(skeleton)
     if len(cloud.rows) == 0:
@@ -50,7 +50,7 @@ def diagnose(skeleton: Skeleton) -> list[str]:
     along = np.einsum("ni,nj->nij", normals, normals)
 
     one_way = np.linalg.eigvalsh(group_sum(along, vertex, len(count)))[:, 2] > SHEET_SHARE * np.maximum(count, 1)
-    sheet = count[one_way].sum() / len(vertex)
+    sheet = count[one_way & ~(skeleton.confidence >= LOW_CONFIDENCE)].sum() / len(vertex)
     if sheet > MAJORITY:
         return [
             f"sheet-like: around {sheet:.0%} of the points the surface faces one direction only, "

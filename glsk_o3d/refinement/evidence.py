@@ -59,13 +59,22 @@ class SurfaceGraph:
         """Over the links."""
         return Diffusion(self.points, self.neighbours)
 
+    @cached_property
+    def areas(self) -> np.ndarray:
+        """What every point stands for, (n,)."""
+        return point_areas(self.points, self.neighbours)
+
+    @cached_property
+    def spacing(self) -> float:
+        """Distance of the points: the root of the median of what they stand for."""
+        return float(np.sqrt(np.median(self.areas)))
+
 
 @dataclass(frozen=True, eq=False)
 class Evidence(SurfaceGraph):
     """The points that support a skeleton, as an oriented surface; it holds while the graph is changed."""
 
     normals: np.ndarray  # (n, 3) unit vectors that point outward
-    areas: np.ndarray  # (n,) what every point stands for
     _said: dict[str, tuple[Skeleton, Any]] = field(default_factory=dict, repr=False)
 
     @classmethod
@@ -76,14 +85,9 @@ class Evidence(SurfaceGraph):
         edge, t = _nearest_edges(skeleton, supporting)
         axis = np.where(edge[:, None] >= 0, places_on_edges(skeleton.vertices, skeleton.edges, edge, t), points)
         normals = orient_from_axis(points, skeleton.normals[supporting], axis, neighbours)
-        made = cls(supporting, points, neighbours, normals, point_areas(points, neighbours))
-        vars(made)["diffusion"] = surface.diffusion  # over the same links
+        made = cls(supporting, points, neighbours, normals)
+        vars(made).update(diffusion=surface.diffusion, areas=surface.areas)  # over the same links
         return made
-
-    @cached_property
-    def spacing(self) -> float:
-        """Distance of the points: the root of the median of what they stand for."""
-        return float(np.sqrt(np.median(self.areas)))
 
     def winding(self, queries: np.ndarray) -> np.ndarray:
         """Winding number of the surface around each place, (m,) float array from (m, 3): near 1 inside, 0 outside."""

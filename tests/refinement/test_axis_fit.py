@@ -251,6 +251,37 @@ def test_confidence_of_a_curve_off_the_axis(height):
     np.testing.assert_allclose(fit_axis(tube((0, height)), 0)[1][inner], expected, rtol=0.02)
 
 
+@pytest.mark.parametrize(
+    ("case", "low", "high"),
+    [("bar", 0.7, 1), ("sheet", 0, 0.05), ("two sheets near each other", 0, 0.05), ("fog", 0, 0.4)],
+)
+def test_a_bar_has_two_sides_and_a_sheet_one(case, low, high):
+    """All points of its faces are as far from the curve as its half thickness; before it settles no fit is sure."""
+    bar = strip(thick=0.003 if "near" in case else 0.06)
+    if case == "sheet":
+        bar = path(bar.vertices, bar.points * [1, 1, 0], np.tile([0.0, 0, 1], (len(bar.points), 1)))
+    elif case == "fog":
+        normals = np.random.default_rng(1).normal(size=bar.normals.shape)
+        bar = path(bar.vertices, bar.points, normals / np.linalg.norm(normals, axis=1)[:, None])
+    sure = np.median(fit_axis(bar, 2, settle=True)[1])
+    assert low <= sure <= high
+    if case == "bar":
+        assert sure > 0.5 + np.median(fit_axis(bar, 2)[1])
+
+
+@pytest.mark.parametrize("aside", [[0, 0.2, 0], [0, 0, 0.1]])
+def test_a_curve_beside_the_middle_of_a_bar_is_less_sure(aside):
+    def doubt(skeleton):
+        x, ends, p, vertex = skeleton.vertices, skeleton.edges, skeleton.points, skeleton.vertex_of_point
+        onto = axis_fit.nearest_on_edges(x, ends, axis_fit.incident_edges(ends, len(x))[vertex], p)
+        near = axis_fit._nearest(x, ends, *onto, p, skeleton.normals, skeleton.radii, sides=True)
+        return np.median(axis_fit._flat_doubt(near, 0.0))
+
+    bar = strip()
+    moved = path(bar.vertices + aside, bar.points, bar.normals)
+    assert doubt(bar) < 0.1 < 0.4 < doubt(moved)
+
+
 def test_points_say_how_wide_a_section_is():
     angle = (np.arange(200) + 0.5) * np.pi / 100
     circle = R * np.column_stack([0 * angle, np.cos(angle), np.sin(angle)])

@@ -8,7 +8,7 @@ import pytest
 from glsk_o3d import Connector, Contractor, LPRReducer, Report, pipelines, samples, skeletonize
 from glsk_o3d.numerics.cycles import minimum_cycle_basis
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
-from glsk_o3d.numerics.winding import AREA_NEIGHBOURS, point_areas
+from glsk_o3d.numerics.winding import AREA_NEIGHBOURS
 from glsk_o3d.refinement.evidence import Evidence
 from glsk_o3d.refinement.loops import WIDE_OPEN, loop_facts
 from glsk_o3d.refinement.spurs import _beside, _outside
@@ -36,7 +36,7 @@ def assert_unchanged(skeleton, raw):
 
 def evidence_of(points, normals):
     _, neighbours = nearest_neighbours(points, AREA_NEIGHBOURS + 1)
-    return Evidence(np.arange(len(points)), points, neighbours, normals, point_areas(points, neighbours))
+    return Evidence(np.arange(len(points)), points, neighbours, normals)
 
 
 # ---- loops
