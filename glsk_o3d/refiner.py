@@ -16,6 +16,7 @@ from .refinement.junctions import move_junctions
 from .refinement.loops import close_loops
 from .refinement.merging import binary_size, collapse_triangles, scaled, with_fields
 from .refinement.spurs import prune_spurs
+from .refinement.wide_ends import level_wide_ends
 from .skeleton import Skeleton
 
 ANSWERS = {"loop": close_loops, "limb": prune_spurs, "air": cut_air, "gap": bridge_gaps}
@@ -35,8 +36,9 @@ class Refiner(Filter[Skeleton]):
        one side was scanned; again after every change of the graph.
     4. The topology is judged by the surface around the curve: false loops are closed, spurs pruned, branches that cross
        air cut, and gaps bridged across which the object continues.
-    5. The curve settles: it is fitted twice more, also to the points themselves where noise has spoilt the normals, and
-       where they hardly differ, as of a leaf of which one side was scanned.
+    5. The curve goes straight through wide ends, as of a pan, and settles: it is fitted twice more, also to the points
+       themselves where noise has spoilt the normals, and where they hardly differ, as of a leaf of which one side was
+       scanned.
     6. Junctions move to where limbs meet, and ends grow along their limbs to where these stop.
     7. The sections are measured, and warnings are collected.
 
@@ -97,7 +99,7 @@ class Refiner(Filter[Skeleton]):
         if len(skeleton.edges) and len(skeleton.supporting_points) and (asks or self.recentre):
             skeleton = self._decide(skeleton, surface)
         if self.recentre and len(skeleton.vertices):
-            skeleton = fit_axis(skeleton, self.recentre + 1, surface, settle=True)
+            skeleton = fit_axis(level_wide_ends(skeleton, surface), self.recentre + 1, surface, settle=True)
             size = binary_size(skeleton)  # fourth powers of lengths must not overflow
             skeleton = scaled(regrow_ends(move_junctions(scaled(skeleton, 1 / size))), size)
         return measured(skeleton)

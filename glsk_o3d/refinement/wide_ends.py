@@ -1,0 +1,66 @@
+"""Lead the curve straight through a wide end: a paddle, a pan, a sign on a pole."""
+
+import numpy as np
+from scipy.sparse.csgraph import dijkstra
+
+from ..numerics.groups import group_sum
+from ..numerics.near_links import linked
+from ..numerics.neighbourhoods import nearest_neighbours
+from ..numerics.vectors import TINY, norm
+from ..skeleton import Skeleton
+from .diagnostics import STUB_LENGTH
+from .evidence import SurfaceGraph
+from .merging import with_fields
+from .sections import measure_sections
+
+WIDE_NECK = 2.0  # fitted: half width of a wide end over that of its neck, at least; with 3 the scores are the same
+
+
+def level_wide_ends(skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
+    """Move the vertices of wide ends to the means of bands of the surface that are equally far from the neck.
+
+    A disc has no axis: every way through it is in the middle of its own sections, so that a fit leaves it as it is. Nor
+    is the way ahead told by the limb, which meets a pan at an angle. The bands know the way from the neck to the rim,
+    and their means hardly depend on the points.
+    """
+    width = np.nan_to_num(measure_sections(skeleton).half_width)
+    leaf = skeleton.degree == 1
+    for branch in skeleton.branches:
+        for path in (branch, branch[::-1]):
+            if leaf[path[-1]] and len(run := _wide_end(path, skeleton.vertices, width)):
+                skeleton = _levelled(skeleton, run, surface)
+    return skeleton
+
+
+def _wide_end(path: np.ndarray, vertices: np.ndarray, width: np.ndarray) -> np.ndarray:
+    """The last vertices of a path, from the neck before its widest place on; none if they are no wide end."""
+    wide, places = width[path], vertices[path]
+    top = int(np.argmax(wide))
+    away = np.flatnonzero(norm(places[:top] - places[top]) >= wide[top])
+    if not len(away) or WIDE_NECK * wide[away[-1]] > wide[top]:
+        return path[:0]
+    neck = int(away[-1])
+    short = len(path) - neck > 3 and np.linalg.norm(places[-1] - places[neck]) < STUB_LENGTH * wide[top]
+    return path[neck:] if short else path[:0]
+
+
+def _levelled(skeleton: Skeleton, run: np.ndarray, surface: SurfaceGraph) -> Skeleton:
+    """The skeleton with a run, whose first two vertices are the neck and stay, at the means of bands behind it."""
+    vertex, k = skeleton.vertex_of_point[surface.supporting], surface.neighbours.shape[1]
+    rows = np.flatnonzero(np.isin(vertex, run))
+    neck = np.flatnonzero(np.isin(vertex[rows], run[:2]))
+    if not len(neck):
+        return skeleton
+    pairs = np.column_stack([np.repeat(np.arange(len(vertex)), k), surface.neighbours.ravel()])
+    away = dijkstra(linked(surface.points, pairs)[rows][:, rows], indices=neck, min_only=True)
+    reached, n = np.isfinite(away), len(run) - 2
+    away, points = away[reached], surface.points[rows[reached]]
+    band = np.minimum((n * away / max(away.max(), TINY)).astype(int), n - 1)
+    count = np.bincount(band, minlength=n)
+    mean = group_sum(points, band, n) / np.maximum(count, 1)[:, None]
+    some = np.flatnonzero(count)
+    vertices, owner = skeleton.vertices.copy(), skeleton.vertex_of_point.copy()
+    vertices[run[2:]] = np.column_stack([np.interp(np.arange(n), some, column) for column in mean[some].T])
+    owned = np.flatnonzero(np.isin(owner, run))
+    owner[owned] = run[2 + band[nearest_neighbours(points, 1, of=skeleton.points[owned])[1][:, 0]]]
+    return with_fields(skeleton, vertices=vertices, vertex_of_point=owner)
