@@ -15,12 +15,12 @@ from .numerics.vectors import PAIRS
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .points import Points, default_k
+from .refinement.evidence import ENOUGH_POINTS
 
 RIDGE_NEIGHBOURS = 32  # fitted: among which a ridge is sought: more than for rings, a noisy shell is thick
 RIDGE_CHUNK = 1024  # speed: points at a time: the (3, points, 32) work arrays then stay in the cache
 MOST_IN_ONE = 4  # fitted: noisy points that are averaged in a pass
 MERGE_WORTH = 0.01  # fitted: share of the points that another round of a pass must merge
-ENOUGH_NOISY = 4096  # fitted: noisy points that are enough; down to about so many they are averaged
 DENOISED_RATIO, DENOISED_NOISE = 1.8, 0.2  # fitted: local outlier ratio of a denoised outlier, and its least noise
 
 
@@ -64,8 +64,8 @@ class Denoiser(Filter[Points]):
 
 def averaged(points: Points) -> Points:
     """Points with means in the place of noisy ones, while there are plenty of these."""
-    while np.count_nonzero(points.noise) >= 2 * ENOUGH_NOISY:
-        row, mean, weight = average_noisy(points.cloud, points.neighbours, points.noise, points.weight, ENOUGH_NOISY)
+    while np.count_nonzero(points.noise) >= 2 * ENOUGH_POINTS:
+        row, mean, weight = average_noisy(points.cloud, points.neighbours, points.noise, points.weight, ENOUGH_POINTS)
         if 2 * len(mean) > len(row):
             break
         neighbours = nearest_neighbours(mean, default_k(len(mean)))[1]

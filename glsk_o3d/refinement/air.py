@@ -14,7 +14,9 @@ from .loops import crossings, positions
 from .merging import drop_edges, drop_lone_vertices
 
 AIR_WINDOW = 1.0  # derived: radii of a branch along which evidence is averaged; a false edge is two radii long or more
-BEYOND_REACH = 3.0  # fitted: radii beyond an edge over which the skeleton should go on straight, but the first third
+HEADING_RADII = (
+    3.0  # fitted: over which a skeleton shows where it goes: beyond an edge, but the first third, or to an end
+)
 CROSSING_HOPS = 6  # fitted: edges around a branch whose vertices count to the side where they are
 LEAST_SCATTER = 0.05  # fitted: of winding numbers along a skeleton
 
@@ -133,7 +135,7 @@ def _straightness(
     way = way / max(np.linalg.norm(way), TINY)
     best = []
     for here, came, sign in ((int(branch[k + 1]), int(branch[k]), 1), (int(branch[k]), int(branch[k + 1]), -1)):
-        ways = _beyond(vertices, around, here, came, BEYOND_REACH * radius)
+        ways = _beyond(vertices, around, here, came, HEADING_RADII * radius)
         best.append(max((sign * float(way @ onward) for onward in ways), default=1.0))
     return max(best)
 

@@ -12,12 +12,12 @@ from ..numerics.near_links import linked
 from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import TINY, dot, norm
 from ..skeleton import Skeleton
+from .air import HEADING_RADII
 from .evidence import LEAST_INSIDE, Evidence
 
 # All fitted but where it says otherwise.
 BRIDGE_REACH = 6.0  # longest gap, in radii of the end
 BRIDGE_COSINE = 0.5  # least cosine between the bridge and the end
-BRIDGE_LOOK_BACK = 3.0  # radii to look back along a branch for its direction
 DETOUR = 3.0  # least way along the skeleton over that across the gap; less would make a loop of nothing
 BRIDGE_SAMPLES = np.arange(1, 8)[:, None] / 8  # derived: places along a bridge, evenly
 CAP_AHEAD, CAP_WIDTH = 2.5, 1.6  # radii ahead of an end, and aside, in which its cap is; behind it one radius
@@ -113,6 +113,6 @@ def _ends(skeleton: Skeleton) -> Iterator[_End]:
         for path in (branch, branch[::-1]):
             if skeleton.degree[path[0]] == 1 and radius > 0:
                 places = skeleton.vertices[path]
-                back = int(np.searchsorted(arc_lengths(places)[1:], BRIDGE_LOOK_BACK * radius)) + 1
+                back = int(np.searchsorted(arc_lengths(places)[1:], HEADING_RADII * radius)) + 1
                 way = places[0] - places[min(back, len(path) - 1)]
                 yield _End(int(path[0]), places[0], way / max(np.linalg.norm(way), TINY), radius)

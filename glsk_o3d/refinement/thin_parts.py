@@ -13,7 +13,7 @@ from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.vectors import COLUMNS, ROWS, TINY
 from ..numerics.winding import AREA_NEIGHBOURS
 from ..skeleton import Skeleton
-from .diagnostics import SHEET_SHARE
+from .diagnostics import SHEET_SHARE, STUB_LENGTH
 from .sections import VertexPoints
 
 SAME_PLACE = 1e-6  # derived: share of the cloud's extent below which points are not apart
@@ -24,7 +24,6 @@ UNSURE_CONFIDENCE = 0.4  # fitted: confidence below which the normals around a v
 REGION_POINTS = 1200  # fitted: points around a vertex of which a share must show a surface
 REGION_VERTICES = 400  # measured: vertices in which these are looked for
 SURE_CONFIDENCE = 0.6  # fitted: least confidence in a stretch that surely has a surface
-SURE_LENGTH = 4.0  # fitted: and its least length, over its radius
 
 
 class SpacedPoints(VertexPoints):
@@ -108,4 +107,4 @@ def _surely_with_surface(skeleton: Skeleton) -> np.ndarray:
     stretch = component_labels(m, ends[inside])
     length = np.bincount(stretch[ends[inside, 0]], skeleton.edge_lengths[inside], m)
     radius = np.bincount(stretch, skeleton.radii, m) / np.maximum(np.bincount(stretch, minlength=m), 1)
-    return sure & (length > SURE_LENGTH * radius)[stretch]
+    return sure & (length > STUB_LENGTH * radius)[stretch]
