@@ -66,10 +66,10 @@ def averaged(points: Points) -> Points:
     """Points with means in the place of noisy ones, while there are plenty of these."""
     while np.count_nonzero(points.noise) >= 2 * ENOUGH_POINTS:
         row, mean, weight = average_noisy(points.cloud, points.neighbours, points.noise, points.weight, ENOUGH_POINTS)
-        if 2 * len(mean) > len(row):
-            break
         neighbours = nearest_neighbours(mean, default_k(len(mean)))[1]
         points = points.remade(row, mean, neighbours, weight=weight, merged=np.bincount(row, points.merged))
+        if 2 * len(mean) > len(row):
+            break
     return points
 
 

@@ -36,7 +36,7 @@ class Refiner(Filter[Skeleton]):
        one side was scanned; again after every change of the graph.
     4. The topology is judged by the surface around the curve: false loops are closed, spurs pruned, branches that cross
        air cut, and gaps bridged across which the object continues.
-    5. The curve goes straight through wide ends, as of a pan, and settles: it is fitted twice more, also to the points
+    5. The curve is led straight through wide ends, as of a pan. It settles: it is fitted twice more, also to the points
        themselves where noise has spoilt the normals, and where they hardly differ, as of a leaf of which one side was
        scanned.
     6. Junctions move to where limbs meet, and ends grow along their limbs to where these stop.
@@ -119,6 +119,7 @@ class Refiner(Filter[Skeleton]):
         settled: dict[str, Skeleton] = {}  # what each question was last asked about
         n_handles = 0
         for about in ORDER_OF_QUESTIONS:
+            n_handles = min(n_handles, skeleton.n_loops)  # cuts may have opened some
             if settled.get(about) is skeleton or (about == "loop" and skeleton.n_loops <= n_handles):
                 continue
             skeleton, found = self._asked(about, skeleton, evidence)

@@ -137,6 +137,13 @@ def test_dense_noisy_clouds_are_averaged():
         return np.hypot(np.hypot(x, y) - 0.4, z).std()
 
     assert off(in_order(state)) < 0.8 * off(in_order(alone))
+    # a pass that finds no more than pairs counts, too, and so does one in a cloud that is clean elsewhere
+    clean = samples.tube(20000, radius=0.05).points + [0, 0, 5]
+    for points, most in (
+        (samples.torus(10000, noise=noise).points, 8192),
+        (np.concatenate([sample.points, clean]), 34000),
+    ):
+        assert len((PREPARED | RingBuilder())(points).cloud) < most
     # every point has its place near it
     away = np.linalg.norm(in_order(state) - sample.points, axis=1)
     assert np.quantile(away, 0.99) < 6 * noise * np.linalg.norm(np.ptp(sample.points, axis=0))

@@ -1,6 +1,7 @@
 """Refiner: raw graph -> one-dimensional skeleton, as far as the outside can see."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 import glsk_o3d as glsk
-from glsk_o3d import Refiner, Report, Skeleton, SkeletonWarning, Tracer, pipelines, samples
+from glsk_o3d import Decision, Pipeline, Refiner, Report, Skeleton, SkeletonWarning, Tracer, pipelines, refiner, samples
 
 PUBLISHED = pipelines.cao2010().stages[-1]
 
@@ -117,6 +118,32 @@ def test_a_loop_that_is_cut_leaves_no_spurs():
     assert (skeleton.n_loops, len(skeleton.leaves)) == (1, 6)
     assert np.isfinite(skeleton.confidence).all()
     assert (skeleton.radii > 0).all()
+
+
+@pytest.mark.parametrize(("cut", "bridged", "asked"), [(0, 0, [1]), (0, 1, [1, 2]), (1, 1, [1, 1])])
+def test_loops_are_asked_about_again_if_bridges_made_some(monkeypatch, cut, bridged, asked):
+    """A handle is not judged twice; one that was cut open does not stand for another that was bridged."""
+    found, gone = [], []
+
+    def answer(about):
+        def given(skeleton, evidence, least):
+            edges = skeleton.edges
+            if about == "loop":
+                found.append(skeleton.n_loops)
+            elif about == "air" and cut:
+                gone.append(edges[len(edges) // 2])  # of the ring, which may have a spur
+                edges = np.delete(edges, len(edges) // 2, axis=0)
+            elif about == "gap" and bridged:
+                edges = np.vstack([edges, gone or [np.sort([edges[0, 0], edges[len(edges) // 2, 1]])]])
+            changed = len(edges) != len(skeleton.edges)
+            return replace(skeleton, edges=edges), [Decision(about, (0, 0, 0), 1.0, changed)]
+
+        return given
+
+    for about in refiner.ANSWERS:
+        monkeypatch.setitem(refiner.ANSWERS, about, answer(about))
+    Refiner(spacing=0)(Pipeline(*pipelines.default().stages[:-2])(samples.torus(1000).points))
+    assert found == asked
 
 
 def test_limbs_without_a_cloud_stay():

@@ -14,10 +14,9 @@ from .loops import crossings, positions
 from .merging import drop_edges, drop_lone_vertices
 
 AIR_WINDOW = 1.0  # derived: radii of a branch along which evidence is averaged; a false edge is two radii long or more
-HEADING_RADII = (
-    3.0  # fitted: over which a skeleton shows where it goes: beyond an edge, but the first third, or to an end
-)
-CROSSING_HOPS = 6  # fitted: edges around a branch whose vertices count to the side where they are
+# fitted: radii over which it is seen where a skeleton goes: beyond an edge, but the first third, or to an end
+HEADING_RADII = 3.0
+CROSSING_HOPS = int(2 * HEADING_RADII)  # derived: edges as long, of half a radius, whose vertices count to their side
 LEAST_SCATTER = 0.05  # fitted: of winding numbers along a skeleton
 
 

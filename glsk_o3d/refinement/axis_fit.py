@@ -113,7 +113,10 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
     if passes:  # the distance from a curve that nobody has centred is no radius
         equal = np.where(near.support > 0, near.sections.radius, radii)
         radii = robust_radii(equal, norm(near.offset), near.doubt, n, vertex)
-    doubt = np.minimum(near.doubt, _flat_doubt(near, surface.spacing)) if passes and settle else near.doubt
+    doubt = near.doubt
+    if passes and settle:
+        spacing = surface.spacing * np.sqrt(len(surface.points) / len(points))
+        doubt = np.minimum(doubt, _flat_doubt(near, spacing))
     confidence = (1 - doubt) * near.support / (near.support + HALF_SUPPORT)
     return with_fields(skeleton, vertices=x + centre, confidence=confidence, radii=radii, vertex_of_point=owner)
 
@@ -251,16 +254,16 @@ def _sides_and_faces(near: _Nearest) -> np.ndarray:
 
 
 def _flat_doubt(near: _Nearest, spacing: float) -> np.ndarray:
-    r"""How little the points say of an axis in the middle of two flat sides, (m,): little doubt is left of a bar.
+    r"""How little the points say of an axis in the middle of two sides, (m,): little doubt is left of a bar.
 
     The planes of both sides are as far from the axis as the half width w and the half thickness t. It is
 
-    .. math:: 1 - (1 - v)\, (1 - |r| / c)\, t^2 / (t^2 + s^2).
+    .. math:: 1 - (1 - \sigma^2)\, (1 - |R| / C)\, t^2 / (t^2 + \rho^2).
 
-    v is the variance of their distances h around these, over :math:`w^2 + t^2`, and this over what normals that point
-    anywhere have, :math:`\pi^2 / 16 - 1 / 2`. The sum r of the outward normals over the sum c of their squares, both
-    across the width, says how far one side has more of them. Two sides nearer to each other than the points' spacing s
-    may be one, such as a table.
+    :math:`\sigma^2` is the variance of their distances h around these, over :math:`w^2 + t^2`, and this over what
+    normals that point anywhere have, :math:`\pi^2 / 16 - 1 / 2`. R is the sum of the outward normals and C that of
+    their squares, both of what is across the width: how far one side has more of them. And two sides that are nearer to
+    each other than two spacings :math:`\rho` of the points may be one, such as a table.
     """
     outward, (width, thickness, across) = near.outward[:, :3], near.sections
     (of_sides, seen), (squares_of_sides, squares) = _sides_and_faces(near).transpose(1, 0, 2)

@@ -13,8 +13,8 @@ from .sections import VertexPoints, measure_sections
 SHEET_SHARE = 0.9  # fitted: share of one direction among the normals around a vertex; a tube has 0.5, half a tube too
 # warning: spread of the normal lines around where they meet, over the radius; a ball has 0, a torus 0.65, a tube 1
 BALL_SPREAD = 0.5
-# warning: length of the evenly filled box with a part's spread, over the median distance to the surface; a ball has 2
-# to 3
+# measured: length of what is hardly longer than thick, over how thick it is: half its width, or the median distance to
+# the surface; the evenly filled box with the spread of a ball has 2 to 3
 STUB_LENGTH = 3.3
 MAJORITY = 0.5  # derived: of the points, from which on a cloud is called what they are
 LOW_CONFIDENCE = 0.1  # warning: below which a vertex is not to be trusted
@@ -30,18 +30,19 @@ def measured(skeleton: Skeleton) -> Skeleton:
     They take the place of those of before, and follow what other filters warned of.
     """
     sections = measure_sections(skeleton)
+    skeleton = replace(skeleton, half_width=sections.half_width, half_thickness=sections.half_thickness)
     others = [message for message in skeleton.report.warnings if message.partition(":")[0] not in REASONS]
-    report = replace(skeleton.report, warnings=(*others, *diagnose(skeleton)))
-    return replace(skeleton, report=report, half_width=sections.half_width, half_thickness=sections.half_thickness)
+    return replace(skeleton, report=replace(skeleton.report, warnings=(*others, *diagnose(skeleton))))
 
 
 def diagnose(skeleton: Skeleton) -> list[str]:
     """Reasons not to trust a skeleton: the cloud is sheet-like, sphere-like, or does not say where much of the axis is.
 
-    Sheet-like: the normals around a vertex have one direction, and it has little confidence: a blade has two sides.
-    Sphere-like: the normal lines of a whole component meet in one point, or it is hardly longer than thick. All are
-    scale-free. Of a cloud that is neither, the parts with little confidence are named, and the least certain question
-    about loops, air and gaps. No edges at all are a reason, too.
+    Sheet-like: the normals around a vertex have one direction, and it has little confidence, unlike a blade, which has
+    two sides; or it is of a component whose curve is hardly longer than the part is wide: a coin, a plate. Sphere-like:
+    the normal lines of a whole component meet in one point, or it is hardly longer than thick. All are scale-free. Of a
+    cloud that is neither, the parts with little confidence are named, and the least certain question about loops, air
+    and gaps. No edges at all are a reason, too.
     """
     cloud = VertexPoints(skeleton)
     if len(cloud.rows) == 0:
@@ -49,8 +50,13 @@ def diagnose(skeleton: Skeleton) -> list[str]:
     vertex, normals, count = cloud.vertex, cloud.normals, cloud.count
     along = np.einsum("ni,nj->nij", normals, normals)
 
+    part, n = skeleton.component_of_vertex, skeleton.n_components
+    component = part[vertex]
+    size = np.bincount(component, minlength=n)[:, None]
     one_way = np.linalg.eigvalsh(group_sum(along, vertex, len(count)))[:, 2] > SHEET_SHARE * np.maximum(count, 1)
-    sheet = count[one_way & ~(skeleton.confidence >= LOW_CONFIDENCE)].sum() / len(vertex)
+    curve = np.bincount(part[skeleton.edges[:, 0]], skeleton.edge_lengths, n)
+    stub = curve < STUB_LENGTH * group_median(skeleton.half_width[vertex], component, n)
+    sheet = count[one_way & (~(skeleton.confidence >= LOW_CONFIDENCE) | stub[part])].sum() / len(vertex)
     if sheet > MAJORITY:
         return [
             f"sheet-like: around {sheet:.0%} of the points the surface faces one direction only, "
@@ -58,9 +64,7 @@ def diagnose(skeleton: Skeleton) -> list[str]:
             "with Open3D's segment_plane or read_cloud(..., where='z > ...')"
         ]
 
-    component, n = skeleton.component_of_vertex[vertex], skeleton.n_components
     points = cloud.points - skeleton.vertices[0]
-    size = np.bincount(component, minlength=n)[:, None]
     # of every normal line I - n n^T, which takes away what is along it
     weight = (size[:, :, None] + 1e-9 * np.maximum(size, 1)[:, :, None]) * np.eye(3) - group_sum(along, component, n)
     height = dot(normals, points)[:, None]

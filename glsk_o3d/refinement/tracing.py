@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spannin
 from scipy.spatial import cKDTree
 
 from ..numerics.groups import component_labels, group_median
-from ..numerics.near_links import join_pieces, linked, slice_centres, steps
+from ..numerics.near_links import LINK_SPACINGS, join_pieces, linked, slice_centres, steps
 from ..numerics.polylines import incident_edges, nearest_on_edges, places_on_edges
 from ..numerics.vectors import dot, norm, unit
 from ..skeleton import NOT_MEASURED, Skeleton
@@ -26,7 +26,7 @@ COVER_SCALES = 1.2  # radius around a path in which points need no path of their
 COVER_RADII = 1.3  # the same over the radius of a part with a surface
 JOIN_SCALES = 8.0  # longest gap that is none, over s
 LEAST_PIECE = 3  # smaller groups of points, farther than that from all others, are left out
-MEETING_SCALES, MEETING_COSINE = 2.0, 0.8  # how near over s, and how straight ahead of each other, two tips meet
+MEETING_COSINE = 0.8  # how straight ahead of each other two tips meet that are as near as linked points
 
 
 def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
@@ -197,7 +197,7 @@ def _meetings(vertices: np.ndarray, edges: np.ndarray, tips: np.ndarray, scale: 
     tips, beside = np.flatnonzero(tips), np.empty(len(vertices), int)
     beside[edges.ravel()] = edges[:, ::-1].ravel()
     ahead = unit(vertices[tips] - vertices[beside[tips]])
-    a, b = cKDTree(vertices[tips]).query_pairs(MEETING_SCALES * scale, output_type="ndarray").T
+    a, b = cKDTree(vertices[tips]).query_pairs(LINK_SPACINGS * scale, output_type="ndarray").T
     gap = vertices[tips[b]] - vertices[tips[a]]
     straight = np.minimum(dot(ahead[a], unit(gap)), -dot(ahead[b], unit(gap)))
     found: list[int] = []

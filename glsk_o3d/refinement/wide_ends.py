@@ -8,7 +8,7 @@ from ..numerics.near_links import linked
 from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.vectors import TINY, norm
 from ..skeleton import Skeleton
-from .diagnostics import STUB_LENGTH
+from .diagnostics import MAJORITY, STUB_LENGTH
 from .evidence import SurfaceGraph
 from .merging import with_fields
 from .sections import measure_sections
@@ -21,27 +21,32 @@ def level_wide_ends(skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
 
     A disc has no axis: every way through it is in the middle of its own sections, so that a fit leaves it as it is. Nor
     is the way ahead told by the limb, which meets a pan at an angle. The bands know the way from the neck to the rim,
-    and their means hardly depend on the points.
+    and their means hardly depend on the points. Balls on a neck are wide ends, too.
     """
     width = np.nan_to_num(measure_sections(skeleton).half_width)
     leaf = skeleton.degree == 1
     for branch in skeleton.branches:
         for path in (branch, branch[::-1]):
-            if leaf[path[-1]] and len(run := _wide_end(path, skeleton.vertices, width)):
+            if leaf[path[-1]] and len(run := _wide_end(path, skeleton.vertices, width, bool(leaf[path[0]]))):
                 skeleton = _levelled(skeleton, run, surface)
     return skeleton
 
 
-def _wide_end(path: np.ndarray, vertices: np.ndarray, width: np.ndarray) -> np.ndarray:
-    """The last vertices of a path, from the neck before its widest place on; none if they are no wide end."""
+def _wide_end(path: np.ndarray, vertices: np.ndarray, width: np.ndarray, other: bool) -> np.ndarray:
+    """The last vertices of a path, from the neck before its widest place on; none if they are no wide end.
+
+    The widest place is near the leaf, the neck a half width or more before it, and as far from an `other` leaf, since
+    rims are narrow. Behind the neck there are two vertices or more.
+    """
     wide, places = width[path], vertices[path]
-    top = int(np.argmax(wide))
-    away = np.flatnonzero(norm(places[:top] - places[top]) >= wide[top])
-    if not len(away) or WIDE_NECK * wide[away[-1]] > wide[top]:
+    top = int(np.argmax(np.where(norm(places - places[-1]) < STUB_LENGTH * wide, wide, 0)))
+    thin = (WIDE_NECK * wide[:top] <= wide[top]) & (norm(places[:top] - places[top]) >= wide[top])
+    thin &= (not other) | (norm(places[:top] - places[0]) >= wide[top])
+    neck = np.flatnonzero(thin)[-1:]
+    if not len(neck) or len(path) - neck[0] < 4:
         return path[:0]
-    neck = int(away[-1])
-    short = len(path) - neck > 3 and np.linalg.norm(places[-1] - places[neck]) < STUB_LENGTH * wide[top]
-    return path[neck:] if short else path[:0]
+    short = np.linalg.norm(places[-1] - places[neck[0]]) < STUB_LENGTH * wide[top]
+    return path[neck[0] :] if short else path[:0]
 
 
 def _levelled(skeleton: Skeleton, run: np.ndarray, surface: SurfaceGraph) -> Skeleton:
@@ -54,6 +59,8 @@ def _levelled(skeleton: Skeleton, run: np.ndarray, surface: SurfaceGraph) -> Ske
     pairs = np.column_stack([np.repeat(np.arange(len(vertex)), k), surface.neighbours.ravel()])
     away = dijkstra(linked(surface.points, pairs)[rows][:, rows], indices=neck, min_only=True)
     reached, n = np.isfinite(away), len(run) - 2
+    if reached.mean() < MAJORITY:  # a bridge joins them, and no surface
+        return skeleton
     away, points = away[reached], surface.points[rows[reached]]
     band = np.minimum((n * away / max(away.max(), TINY)).astype(int), n - 1)
     count = np.bincount(band, minlength=n)
@@ -61,6 +68,6 @@ def _levelled(skeleton: Skeleton, run: np.ndarray, surface: SurfaceGraph) -> Ske
     some = np.flatnonzero(count)
     vertices, owner = skeleton.vertices.copy(), skeleton.vertex_of_point.copy()
     vertices[run[2:]] = np.column_stack([np.interp(np.arange(n), some, column) for column in mean[some].T])
-    owned = np.flatnonzero(np.isin(owner, run))
+    owned = np.flatnonzero(np.isin(owner, run[2:]))
     owner[owned] = run[2 + band[nearest_neighbours(points, 1, of=skeleton.points[owned])[1][:, 0]]]
     return with_fields(skeleton, vertices=vertices, vertex_of_point=owner)

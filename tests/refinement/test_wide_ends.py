@@ -65,7 +65,30 @@ def test_other_ends_stay_as_they_are():
     assert found is given
 
 
+def test_both_ends_may_be_wide():
+    """A dumbbell of two discs, the second as far behind the handle's end as the first before it."""
+    points, normals = paddle()
+    own = points[:, 0] > -0.5
+    points, normals = points[own], normals[own]
+    x = np.linspace(-1.15, 0.15, 60)
+    both = np.concatenate([points, points * [-1, 1, 1] - [1, 0, 0]]), np.concatenate([normals, normals * [-1, 1, 1]])
+    given, found = led(np.column_stack([x, 0 * x, 0 * x]), *both)
+    moved = np.linalg.norm(found.vertices - given.vertices, axis=1) > 0
+    np.testing.assert_array_equal(
+        moved, np.abs(given.vertices[:, 0] + 0.5) > np.abs(given.vertices[~moved, 0] + 0.5).max()
+    )
+    assert np.ptp(found.vertices[:, 0]) > 1.4  # both reach their rims
+
+
+def test_a_disc_that_hangs_on_a_bridge_stays_as_it_is():
+    points, normals = paddle()
+    own = (points[:, 0] < -0.24) | (points[:, 0] > -0.14)
+    x = np.linspace(-0.68, 0.2, 40)
+    given, found = led(np.column_stack([x, 0 * x, 0 * x]), points[own], normals[own])
+    assert found is given
+
+
 @pytest.mark.slow
 def test_the_curve_of_a_paddle_hardly_depends_on_the_sample():
     off = [np.abs(skeletonize(paddle(seed=seed)[0]).vertices[:, 1]).mean() for seed in range(5)]
-    assert np.median(off) < 0.01  # of a radius of .25; .02 if the curve takes any way
+    assert max(off) < 0.015  # of a radius of .25; .03 if the curve takes any way
