@@ -21,7 +21,7 @@ RIDGE_NEIGHBOURS = 32  # fitted: among which a ridge is sought: more than for ri
 RIDGE_CHUNK = 1024  # speed: points at a time: the (3, points, 32) work arrays then stay in the cache
 MOST_IN_ONE = 4  # fitted: noisy points that are averaged in a pass
 MERGE_WORTH = 0.01  # fitted: share of the points that another round of a pass must merge
-DENOISED_RATIO, DENOISED_NOISE = 1.8, 0.2  # fitted: local outlier ratio of a denoised outlier, and its least noise
+DENOISED_RATIO = 1.8  # fitted: local outlier ratio of a denoised outlier
 
 
 @documented
@@ -84,7 +84,7 @@ def to_ridges(points: Points, passes: int) -> Points:
     k = points.neighbours.shape[1]
     neighbours = nearest_moved(denoised, points.neighbours, points.noise > 0)
     mean_distance = distances(denoised, neighbours[:, 1:]).mean(axis=1)
-    outlier = (local_outlier_ratio(mean_distance, neighbours) > DENOISED_RATIO) & (points.noise > DENOISED_NOISE)
+    outlier = (local_outlier_ratio(mean_distance, neighbours) > DENOISED_RATIO) & (points.noise > 0)
     if outlier.sum() > len(denoised) - max(k, MIN_POINTS):  # too few would be left
         outlier[:] = False
     left, row = np.flatnonzero(~outlier), np.cumsum(~outlier) - 1

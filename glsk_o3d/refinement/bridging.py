@@ -14,13 +14,13 @@ from ..numerics.vectors import TINY, dot, norm
 from ..skeleton import Skeleton
 from .air import HEADING_RADII
 from .evidence import LEAST_INSIDE, Evidence
+from .spurs import NOT_BESIDE
 
 # All fitted but where it says otherwise.
 BRIDGE_REACH = 6.0  # longest gap, in radii of the end
 BRIDGE_COSINE = 0.5  # least cosine between the bridge and the end
 DETOUR = 3.0  # least way along the skeleton over that across the gap; less would make a loop of nothing
 BRIDGE_SAMPLES = np.arange(1, 8)[:, None] / 8  # derived: places along a bridge, evenly
-CAP_REACH = 2.0  # radii ahead of an end, and aside, in which its cap is; behind it one radius
 
 
 class _End(NamedTuple):
@@ -100,8 +100,8 @@ def _cap(end: _End, evidence: Evidence) -> float:
     offset = evidence.points - end.place
     ahead = offset @ end.outward
     beside = dot(offset, offset) - ahead**2
-    near = (ahead > -end.radius) & (ahead < CAP_REACH * end.radius)
-    near &= beside < (CAP_REACH * end.radius) ** 2
+    near = (ahead > -end.radius) & (ahead < NOT_BESIDE * end.radius)
+    near &= beside < (NOT_BESIDE * end.radius) ** 2
     facing = np.maximum(evidence.normals[near] @ end.outward, 0)
     return float(evidence.areas[near] @ facing / (np.pi * end.radius**2))
 

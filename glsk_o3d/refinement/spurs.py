@@ -21,7 +21,7 @@ SPUR_POINTS = 128  # speed: of a branch that are enough to say how far it reache
 SPUR_QUANTILE = 0.9  # fitted: share of a spur's points that its reach covers
 LEAST_OUT = 0.3  # fitted: half widths below which a protrusion says no more
 LONG_OUTSIDE = 4.0  # derived: half widths of a part that is twice as long as it is wide
-BESIDE = 2.0  # fitted: half widths from the curve to where nothing is beside a limb
+NOT_BESIDE = 2.0  # fitted: half widths from a curve to where nothing is beside it, nor the cap of its end
 OUTER_PLACES = np.linspace(1 / 3, 1, 5)  # measured: of the length; each but the first and last is asked
 ACROSS = 16  # precision: directions across a branch; eight are enough for flat parts
 
@@ -171,7 +171,7 @@ def _beside(
     second = unit(np.where(norm(second)[:, None] > 1e-6, second, plane_axes(tangent)[:, :, 0]))
     turn = np.linspace(0, 2 * np.pi, ACROSS, endpoint=False)[:, None, None]
     across = np.cos(turn) * cross(second, tangent) + np.sin(turn) * second
-    away = BESIDE * half[:, None, None] * across.reshape(ACROSS, len(paths), -1, 3)
+    away = NOT_BESIDE * half[:, None, None] * across.reshape(ACROSS, len(paths), -1, 3)
     beside = places[:, 1:-1] + away
     winding = evidence.winding(beside.reshape(-1, 3)).reshape(beside.shape[:-1])
     inside: np.ndarray = np.clip(winding.max(axis=0), 0, 1).mean(axis=1)
