@@ -7,7 +7,7 @@ from .decisions import QUESTIONS, Decision
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .refinement.air import cut_air
-from .refinement.axis_fit import fit_axis, pull_back_detached, subdivide_edges
+from .refinement.axis_fit import fit_axis, pull_back_detached
 from .refinement.bridging import bridge_gaps
 from .refinement.diagnostics import measured
 from .refinement.ends import regrow_ends
@@ -16,6 +16,7 @@ from .refinement.junctions import move_junctions
 from .refinement.loops import close_loops
 from .refinement.merging import binary_size, collapse_triangles, scaled, with_fields
 from .refinement.spurs import prune_spurs
+from .refinement.subdivision import subdivide_edges
 from .refinement.wide_ends import level_wide_ends
 from .skeleton import Skeleton
 
