@@ -232,9 +232,10 @@ def _middle(near: _Nearest) -> tuple[np.ndarray, np.ndarray]:
     width, thickness, across = near.sections
     odd, distant = dot(near.outward[:, :3], across), dot(near.outward[:, 3:6], across)
     flat = 1 - thickness / np.maximum(width, TINY)
-    for half, (normals, squares) in zip((width, thickness), _sides_and_faces(near), strict=True):
+    sums = _sides_and_faces(near)
+    for half, (normals, squares) in zip((width, thickness), sums, strict=True):
         flat *= np.clip(2 - squares / np.maximum(np.maximum(half**2 * normals, squares / 2), TINY), 0, 1) ** 2
-    seen = _sides_and_faces(near)[0, 0]
+    seen = sums[0, 0]
     firm = flat * np.maximum(seen - np.abs(odd), 0)
     way = flat * seen * (distant - width * odd) / np.maximum(seen + np.abs(odd), TINY)
     return firm, np.clip(way, -firm * width, firm * width)
