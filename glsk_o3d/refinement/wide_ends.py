@@ -11,7 +11,7 @@ from ..skeleton import Skeleton
 from .diagnostics import MAJORITY, STUB_LENGTH
 from .evidence import SurfaceGraph
 from .merging import with_fields
-from .sections import measure_sections
+from .sections import VertexPoints, measure_sections
 
 WIDE_NECK = 2.0  # fitted: half width of a wide end over that of its neck, at least; with 3 the scores are the same
 
@@ -23,7 +23,10 @@ def level_wide_ends(skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
     is the way ahead told by the limb, which meets a pan at an angle. The bands know the way from the neck to the rim,
     and their means hardly depend on the points. Balls on a neck are wide ends, too.
     """
-    width = np.nan_to_num(measure_sections(skeleton).half_width)
+    # where normals mean nothing, as on scan lines, the points here or beside are farther away than the half width
+    away, (a, b) = VertexPoints(skeleton).distance, skeleton.edges.T
+    width = np.fmax(measure_sections(skeleton).half_width, away)
+    np.maximum.at(width, np.concatenate([a, b]), away[np.concatenate([b, a])])
     leaf = skeleton.degree == 1
     for branch in skeleton.branches:
         for path in (branch, branch[::-1]):
