@@ -20,7 +20,7 @@ FINGERPRINTS = {
     "prisms": ["fb41f81cbe425ceb", "b2d82c30aa6c9da3", "08ec40c659437e7d", "975a58e20b502098"],
     "implements": ["4126e85541819406", "d4e4924ec0f80929", "9dae3835291f106b", "51207185fbb7ab91"],
     "animals": ["661d00ec2d7e8d31", "fa508742e6a638a4", "e72d9159186e86c8", "56390e61dde05a92"],
-    "plates": ["d668bb5510fc3be8", "1c2e2fdf821ae43b", "aec1ce7cc950f27f", "1779dff5feba1c70"],
+    "plates": ["9ed078b79dd48475", "1c2e2fdf821ae43b", "9a543c09c2dbcb28", "475a94c121430db8"],
     "blades": ["076505c426d87059", "9ebd5c97c653d376", "809764596e689506", "6ebe92f4f30b54c3"],
     "mugs": ["3a2fb2847c72ba3b", "c59d671510e808be", "906d30c225ddf9f6", "1590655500b39644"],
 }

@@ -16,6 +16,7 @@ BLEND_REACH = 4  # fitted: how much farther blended parts are looked for, in the
 MOST_EXPONENT = 60  # derived: keeps exponentials finite
 NEAR_FACE = 0.01  # fitted: how far out from a sweep points are asked whether they are inside
 SAME_PLANE = 1e-6  # derived: of two faces in one plane, one counts: more than roundings
+LEAST_COSINE = 1e-6  # derived: of a gradient and a normal that tell which side is out: more than roundings
 # Of the shell around a blended surface, in the least half axis: its half thickness and the cells that it is found in.
 SHELL, SHELL_CELL, LEAST_SHELL_CELL = 0.3, 0.7, 0.006  # fitted
 STEEPEST = 1.05  # fitted: length of gradients of a blend, at most
@@ -85,8 +86,9 @@ def _on_faces(solid, n, rng):
         mine = np.flatnonzero(owner[triangle] == k)
         near = part.distance(found[mine], NEAR_FACE)
         away[mine[near.rows]] = near.gradients
-    sign = np.sign(dot(outward, away)) * np.where(owner[triangle] < solids, 1, -1)
-    return Surface(found, outward * np.where(sign == 0, 1, sign)[:, None], float(area[-1] * have / tried))
+    # on an edge the gradient may stand on the normal: there its sign would be the rounding's, another on each processor
+    sign = np.where(dot(outward, away) < -LEAST_COSINE, -1, 1) * np.where(owner[triangle] < solids, 1, -1)
+    return Surface(found, outward * sign[:, None], float(area[-1] * have / tried))
 
 
 def _shows(parts, solids, points, owner):
