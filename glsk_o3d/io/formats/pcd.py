@@ -79,8 +79,9 @@ def _compressed(path: Path) -> Scan:
     with path.open("rb") as stream:
         row, points, _ = read_header(stream)
         packed, size = np.frombuffer(stream.read(8).ljust(8, b"\0"), "<u4").tolist()
+        # before they are read: room for all that is promised is taken at once
+        check_promised(packed, path.stat().st_size - stream.tell(), "compressed bytes")
         data = stream.read(packed)
-    check_promised(packed, len(data), "compressed bytes")
     check_promised(points * row.itemsize, size, "bytes")
     unpacked, columns, at = _unpacked(data, size), {}, 0
     for name in row.names or ():  # one after the other

@@ -1,5 +1,7 @@
 """PCD as others write it, and as nobody should."""
 
+import tracemalloc
+
 import numpy as np
 import open3d as o3d
 import pytest
@@ -59,6 +61,18 @@ def test_fields_of_odd_names(tmp_path, fields, attributes):
     np.testing.assert_array_equal(scan.positions.T, values[:3])
     assert list(scan.attributes) == attributes
     np.testing.assert_array_equal(scan.attributes[attributes[-1]], values[-1])
+
+
+def test_room_is_taken_for_no_more_than_the_file_has(tmp_path):
+    head = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 2\nDATA binary_compressed\n"
+    (tmp_path / "c.pcd").write_bytes(head.encode() + np.array([2**32 - 58, 24], "<u4").tobytes() + b"few")
+    tracemalloc.start()
+    try:
+        with pytest.raises(FileFormatError, match="promises 4294967238 compressed bytes"):
+            read_scan(tmp_path / "c.pcd")
+        assert tracemalloc.get_traced_memory()[1] < 1 << 24
+    finally:
+        tracemalloc.stop()
 
 
 @pytest.mark.parametrize(
