@@ -25,14 +25,13 @@ IDEAS = {
     "thinning": "Sampler.size=all Thinner.thin_to=all",
     "outliers set aside": "OutlierRemover.outlier_factor=0",
     "denoising": "Denoiser.denoise=0",
-    "point reduction": "Contractor.reducer=none",
-    "mass of merged points": "LPRReducer.conserve_mass=false",
-    "mended rings": "LPRReducer.mend_rings=false",
-    "cheapest merges first": "LPRReducer.order=index",
+    "merges of many points alone": "LPRReducer.least=0",
+    "mass of merged points": "LPRReducer.least=0 LPRReducer.conserve_mass=false",
+    "mended rings": "LPRReducer.least=0 LPRReducer.mend_rings=false",
+    "cheapest merges first": "LPRReducer.least=0 LPRReducer.order=index",
     "stop by score": "Contractor.stop=RingSizeRatio",
     "stop at 3 %": "ExplainedScore.threshold=0.02",
     "last solve kept": "Contractor.keep_last=false",
-    "floor of attraction": "Contractor.min_attraction=0",
     "hold on lines": "Contractor.line_hold=1",
     "runaways held": "Contractor.retries=0",
     "sampling by thickness": "Connector.radius=2% Connector.thickness=0",
@@ -47,7 +46,7 @@ IDEAS = {
     "thin parts traced": "Tracer.surface=0",
 }
 """What `default` adds to the publications, and the settings that switch it off. All of them together (but for the
-reduction and the stop rule, which are published) are `wen2024`."""
+stop rule, which is published) are `wen2024`."""
 MEASURES = {"tips_f1": "tips F1", "junctions_f1": "junctions F1", "length": "length"}
 CLOUD = ("pipeline", "variant", "shape", "draw")  # what one row of a result is of
 WORTH = dict(perfect=2, topology=2, error=3)  # the digits of what is compared cloud by cloud

@@ -72,9 +72,6 @@ class Contractor(Filter[Contraction]):
     )
     amplification: float = parameter(3.0, "Factor on w_L after each solve.", low=1)
     max_contraction: float = parameter(2048.0, "Cap of w_L.", low=0, open_low=True)
-    min_attraction: float = parameter(
-        1.0, "Floor of W_H: a point whose ring grows would be held ever less, and run away.", low=0
-    )
     line_hold: float = parameter(
         30.0, "Factor on W_H where the cloud is a line already: more contraction would only shorten it.", low=1
     )
@@ -134,7 +131,7 @@ class Contractor(Filter[Contraction]):
         if self.line_hold > 1 and state.report.iterations:
             line = explained_variance(state.positions, state.rings) > LINE_VARIANCE
             attraction = np.where(line, self.line_hold, 1) * attraction
-        attraction = np.clip(attraction, self.min_attraction, self.max_attraction)
+        attraction = np.minimum(attraction, self.max_attraction)
         laplacian, mass = laplacian_of(state), np.sqrt(state.mass)
         positions, facts = self._solve_in_box(state, laplacian, contraction / mass, attraction, mass)
         _, ring_size = state.rings.nearest(positions)

@@ -10,6 +10,7 @@ from .lpr_reducer import LPRReducer
 from .outlier_remover import OutlierRemover
 from .parameters import Parameters
 from .pipeline import Pipeline
+from .refinement.evidence import ENOUGH_POINTS
 from .refiner import Refiner
 from .ring_builder import RingBuilder
 from .sampler import Sampler
@@ -51,7 +52,7 @@ def _published(**contraction: Any) -> Pipeline[Skeleton]:
     return (
         Sampler(size="all", frame="box")
         | RingBuilder(k="published")
-        | Contractor(min_attraction=0, line_hold=1, keep_last=False, retries=0, **contraction)
+        | Contractor(line_hold=1, keep_last=False, retries=0, **contraction)
         | Connector(radius="2%", thickness=0, links="nearest")
         | Refiner(collapse="degree", handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)
     )
@@ -66,7 +67,7 @@ def default() -> Pipeline[Skeleton]:
     >>> default()(torus(1000).points).n_loops
     1
     """
-    return rings() | Contractor(reducer=LPRReducer()) | Connector() | Refiner() | Tracer()
+    return _graph() | Refiner() | Tracer()
 
 
 def tree(root: str | Any = "z") -> Pipeline[Skeleton]:
@@ -86,7 +87,12 @@ def tree(root: str | Any = "z") -> Pipeline[Skeleton]:
     >>> grown.n_components, grown.n_loops, len(grown.leaves)
     (1, 0, 3)
     """
-    return rings() | Contractor(reducer=LPRReducer()) | Connector() | Refiner(handle=1) | Tracer(root=root)
+    return _graph() | Refiner(handle=1) | Tracer(root=root)
+
+
+def _graph() -> Pipeline[Skeleton]:
+    """The raw graph of `default`. Its merges wait for large clouds: which pairs they take hangs on the least change."""
+    return rings() | Contractor(reducer=LPRReducer(least=2 * ENOUGH_POINTS)) | Connector()
 
 
 def rings() -> Pipeline[Contraction]:

@@ -15,8 +15,7 @@ from .pipeline import Filter, Watch
 from .points import Points, default_k
 
 ASK_AGAIN = 0.25  # speed: share of the points left, below which the neighbours are looked up anew
-DENSE_FROM = 2000  # fitted: points from which on more than enough are merged
-ENOUGH = 2400  # fitted: points on a body without thin parts
+ENOUGH = 2400  # fitted: points on a body without thin parts; fewer are not thinned
 PACKED = 0.42  # measured: points left on an area of 1 if none are to be nearer than 1
 SMOOTHING = 8  # fitted: steps over which the thickness of parts is averaged
 LEAST_MERGED = 0.001  # measured: share of the points that a round must merge: along a spiral it is one each
@@ -77,7 +76,7 @@ class Thinner(Filter[Points]):
         if self.thin_to == "all":
             return points
         before = np.inf
-        while self.around and DENSE_FROM <= len(points) <= before / 2:
+        while self.around and ENOUGH <= len(points) <= before / 2:
             before, here = len(points), points.cloud[points.survivors]
             apart = spacing_enough(here, points.neighbours, points.spread, self.around)
             points = _merged(points, thin_nearer(here, points.neighbours, apart))

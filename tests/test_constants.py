@@ -18,7 +18,7 @@ sys.path.insert(0, str(ROOT / "docs" / "_ext"))
 steering = importlib.import_module("steering")
 sys.path.pop(0)
 NUMERIC = sorted({*steering.files(), *(path for room in ROOMS for path in room.glob("*.py"))})
-MOST_STEERING = 130
+MOST_STEERING = 129
 """Numbers that steer a skeleton, at most: a change that adds one takes one out."""
 
 

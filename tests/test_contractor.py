@@ -216,7 +216,7 @@ def test_unsolvable_system_keeps_the_last_sound_state(built, monkeypatch, fails_
     assert not state.report.converged
 
 
-# ---- weights, floors, and points held
+# ---- weights, and points held
 
 
 class Capture:
@@ -255,19 +255,19 @@ def test_thrown_points_are_held(built, monkeypatch):
 
 
 def test_lines_are_held_from_the_second_solve_on(built, monkeypatch):
-    hold, floor, cap = 30, 3, 50
-    filter = Contractor(stop=never, max_iterations=1, line_hold=hold, min_attraction=floor, max_attraction=cap)
+    hold, cap = 30, 50
+    filter = Contractor(stop=never, max_iterations=1, line_hold=hold, max_attraction=cap)
     share = np.linspace(LINE_VARIANCE - 0.3, 1, len(built))
     monkeypatch.setattr(module, "explained_variance", lambda points, rings: share[: len(points)])
     capture = Capture(monkeypatch)
     one = filter(built)
     filter(one)
     (_, first), (_, second) = capture.calls
-    np.testing.assert_array_equal(first, np.clip(np.ones(len(built)), floor, cap))
+    np.testing.assert_array_equal(first, np.ones(len(built)))
     ratio = one.ring_size0 / one.ring_size
     held = share > LINE_VARIANCE
     assert 0 < held.sum() < len(built)
-    np.testing.assert_allclose(second, np.clip(np.where(held, hold * ratio, ratio), floor, cap), rtol=1e-12)
+    np.testing.assert_allclose(second, np.minimum(np.where(held, hold * ratio, ratio), cap), rtol=1e-12)
 
 
 def test_held_lines_keep_their_bends():

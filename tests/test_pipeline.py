@@ -166,7 +166,7 @@ def test_options_by_full_and_by_short_name():
     assert varied == (
         Pipeline(*prepare)
         | dataclasses.replace(builder, k=24)
-        | dataclasses.replace(contractor, reducer=LPRReducer(phi=2e5))
+        | dataclasses.replace(contractor, reducer=dataclasses.replace(contractor.reducer, phi=2e5))
         | connector
         | dataclasses.replace(refiner, spacing=1)
         | tracer

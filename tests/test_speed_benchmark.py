@@ -22,7 +22,7 @@ def call(call, parts, monkeypatch):
 
 class TestStopwatch:
     def test_the_default_pipeline_goes_through_every_stage(self, parts, monkeypatch):
-        points = sauropod(2400, noise=0.01).points
+        points = sauropod(4000, noise=0.01).points
         pipelines.default()(points)  # so that nothing is imported below
         ticks = count()
         monkeypatch.setattr(parts.stopwatch, "_clocks", lambda: (next(ticks), 0.0))

@@ -270,7 +270,7 @@ def lpr_reducer():
 
 def connector():
     points = animal()
-    state = (glsk.pipelines.rings() | glsk.Contractor(reducer=glsk.LPRReducer()))(points)
+    state = (glsk.pipelines.rings() | glsk.Contractor())(points)
     raw = glsk.Connector()(state)
     figure, axes = panels(["contracted points", f"{len(raw.vertices)} vertices, {len(raw.edges)} edges"], 0.8)
     dots(axes[0], state.contracted, INK, 3)
@@ -282,7 +282,7 @@ def connector():
 
 def refiner():
     points = animal()
-    raw = (glsk.pipelines.rings() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.Connector())(points)
+    raw = (glsk.pipelines.rings() | glsk.Contractor() | glsk.Connector())(points)
     fine = glsk.Refiner()(raw)
     figure, axes = panels(
         [f"before: {raw.n_loops} loops, counting triangles", f"after: {fine.n_loops} loop, {len(fine.leaves)} ends"],
@@ -353,7 +353,7 @@ def hull():
 def contraction():
     points = animal()
     states = []
-    (glsk.pipelines.rings() | glsk.Contractor(reducer=glsk.LPRReducer()))(points, on_state=states.append)
+    (glsk.pipelines.rings() | glsk.Contractor())(points, on_state=states.append)
     left = [len(points), *map(len, states)]
     shown = range(len(left))
     titles = [f"solve {t}: {left[t]} points" if t else f"the scan: {left[0]} points" for t in shown]
@@ -398,7 +398,7 @@ def centring():
     """A cross-section of a bent tube seen from one side only, before and after the fit to the axis."""
     torus = samples.torus(6000)
     points = torus.points[torus.points[:, 2] > 0]
-    built = glsk.pipelines.rings() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.Connector()
+    built = glsk.pipelines.rings() | glsk.Contractor() | glsk.Connector()
     raw = built(points)
     figure, axes = panels(["before the fit", "after it: where the normals meet"], 0.75)
     for each, passes in zip(axes, (0, 3), strict=True):
@@ -424,7 +424,7 @@ def centring():
 
 def loop_test():
     points = animal(6000)
-    raw = (glsk.pipelines.rings() | glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.Connector())(points)
+    raw = (glsk.pipelines.rings() | glsk.Contractor() | glsk.Connector())(points)
     skeleton = glsk.Refiner()(raw)
     figure, axes = panels(
         ["before: every loop of four edges and more", "after: the circle fits through the handle"], 0.8

@@ -16,13 +16,13 @@ cloud = sauropod(4096, noise=0.002).points
 # %%
 # **Preparation**: a scan of any size becomes points without outliers, noise and more of them than it takes. **Rings**:
 # which neighbours surround each point. **Contraction**: the rings' Laplacian draws the points inwards,
-# while local point reduction (**LPR**) merges those that say little more than their neighbours. **Connection**:
-# clusters of contracted points become a graph. **Refinement**: the graph becomes a curve in the middle of the
-# surface. **Tracing** is for twigs that show no surface; here it finds nothing to do.
+# while local point reduction (**LPR**) merges those of a large cloud that say little more than their neighbours.
+# **Connection**: clusters of contracted points become a graph. **Refinement**: the graph becomes a curve in the middle
+# of the surface. **Tracing** is for twigs that show no surface; here it finds nothing to do.
 
 prepared = (glsk.Sampler() | glsk.OutlierRemover() | glsk.Denoiser() | glsk.Thinner())(cloud)
 rings = glsk.RingBuilder()(prepared)
-contracted = glsk.Contractor(reducer=glsk.LPRReducer())(rings)
+contracted = glsk.Contractor(reducer=glsk.LPRReducer(least=8192))(rings)
 graph = glsk.Connector()(contracted)
 skeleton = glsk.Tracer()(glsk.Refiner()(graph))
 for state in (rings, contracted, graph, skeleton):
@@ -62,7 +62,7 @@ pipeline = (
     | glsk.Denoiser()
     | glsk.Thinner()
     | glsk.RingBuilder()
-    | glsk.Contractor(reducer=glsk.LPRReducer())
+    | glsk.Contractor(reducer=glsk.LPRReducer(least=8192))
     | glsk.Connector()
     | glsk.Refiner()
     | glsk.Tracer()

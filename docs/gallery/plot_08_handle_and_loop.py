@@ -14,7 +14,7 @@ from glsk_o3d.samples import sauropod
 
 cloud = sauropod(6000, noise=0.002).points
 rings = glsk.pipelines.rings()(cloud)
-graph = (glsk.Contractor(reducer=glsk.LPRReducer()) | glsk.Connector())(rings)
+graph = (glsk.Contractor() | glsk.Connector())(rings)
 
 # %%
 # The raw graph is full of small loops. Those of three edges are no loops but triangles, and the refinement closes

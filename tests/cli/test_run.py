@@ -34,10 +34,8 @@ def test_a_script_of_ours_is_the_pipeline(invoke, scans, script, tmp_path):
     assert result.exit_code == 0, result.stderr
     assert result.stdout.startswith("1. Generate Curve Skeleton (GLSkeleton): layer 1, vertices ")
     assert result.stdout.endswith("wrote s.json\nwrote s.ply\n")
-    contractor = glsk_o3d.Contractor(reducer=glsk_o3d.LPRReducer())
-    connector = glsk_o3d.Connector(radius=0.02 * Layer.read(scan).diagonal)
-    ahead, behind = glsk_o3d.pipelines.rings(), glsk_o3d.Refiner() | glsk_o3d.Tracer()
-    expected = (ahead | contractor | connector | behind)(read_cloud(scan))
+    radius = 0.02 * Layer.read(scan).diagonal
+    expected = glsk_o3d.pipelines.default().with_options({"Connector.radius": radius})(read_cloud(scan))
     assert f", iterations {len(expected.report.iterations)}, " in result.stdout
     back = read_skeleton(tmp_path / "s.json")
     np.testing.assert_array_equal(back.vertices, expected.vertices)

@@ -63,7 +63,7 @@ def test_what_has_a_surface_stays_and_so_does_the_root():
 
 @pytest.mark.slow
 def test_noise_as_wide_as_twigs_makes_few_false_tips():
-    """Beside the root and 16 true ones fewer than half of those that there are without the rule."""
-    left = pipelines.tree()(samples.tree(4096, forks=4, noise=0.002).points)
-    assert left.report.n_traced > 500
-    assert 17 <= len(left.leaves) < 28
+    """Beside the root and 16 true ones fewer than half of those that there are without the rule: the mean of trees."""
+    left = [pipelines.tree()(samples.tree(4096, forks=4, noise=0.002, seed=seed).points) for seed in range(4)]
+    assert min(skeleton.report.n_traced for skeleton in left) > 500
+    assert 17 <= np.mean([len(skeleton.leaves) for skeleton in left]) < 28
