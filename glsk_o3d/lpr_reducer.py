@@ -30,8 +30,8 @@ class LPRReducer(Filter[Contraction]):
     the Delaunay star of i among both rings, on the uncontracted points, projected along the Laplacian coordinate of i;
     m's entry in every other ring becomes i. A point takes part in at most one merge a pass.
 
-    Which points pair off hangs on the least differences, and every pass makes them larger: moved by 1e-7, no survivor of
-    four passes is where it was. A cloud that has no more than `least` survivors is therefore left as it is.
+    Which points pair off hangs on the least differences, and every pass makes them larger: of a cloud moved by 1e-7 no
+    survivor of four passes is where it was. One that has no more than `least` survivors is therefore left as it is.
 
     With `conserve_mass` a survivor takes over the mass of the point it swallows, and the ring sizes s(0) and s(t) are
     measured anew on the combined rings. Without it, bent parts leave their axis.
