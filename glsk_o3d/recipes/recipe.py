@@ -38,9 +38,9 @@ def to_recipe(pipeline: Pipeline[Any]) -> dict[str, Any]:
 
     Examples
     --------
-    >>> from glsk_o3d import LPRReducer
-    >>> to_recipe(Pipeline(LPRReducer()))["pipeline"]
-    [{'filter': 'LPRReducer', 'phi': 100000.0, 'conserve_mass': True, 'mend_rings': True, 'order': 'cheapest'}]
+    >>> from glsk_o3d import Thinner
+    >>> to_recipe(Pipeline(Thinner()))["pipeline"]
+    [{'filter': 'Thinner', 'around': 20.0, 'thin_to': 'auto'}]
     """
     recipe = recipe_of(*(stage.table() for stage in pipeline.stages))
     from_recipe(recipe)  # refuses what it could not make again
