@@ -73,7 +73,6 @@ class LPRReducer(Filter[Contraction]):
         "Order of merges: the least F / s^2 first, or the lowest point index.",
         choices=("cheapest", "index"),
     )
-
     least: int = parameter(0, "Merge nothing once no more survivors are left.", unit="points", low=0)
 
     def _run(self, state: Contraction, watch: Watch | None) -> Contraction:
