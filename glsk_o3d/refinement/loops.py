@@ -56,14 +56,13 @@ class LoopEvidence(NamedTuple):
     """What speaks for and against that a loop is a handle."""
 
     facts: dict[str, float]
-    inside: float  # median winding number along it
     centre: np.ndarray  # of its hole
     weakest: int  # position of the edge, from there to the next vertex, that the fewest bonds cross
 
     @property
     def probability(self) -> float:
-        """That it is one; a loop that has no inside itself is none."""
-        return QUESTIONS["loop"].probability(self.facts) if self.inside >= LEAST_INSIDE else 0.0
+        """That it is one."""
+        return QUESTIONS["loop"].probability(self.facts)
 
 
 def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> list[LoopEvidence]:
@@ -90,10 +89,10 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
         facts = dict(
             opening=float(np.log(min(view.radius, WIDE_OPEN * tube) / tube + 0.1)),
             sight=min(view.sight, WIDE_OPEN),
-            fall=float(1 - outside / max(inside, LEAST_INSIDE)),
+            fall=float((inside - outside) / max(inside, LEAST_INSIDE)),
             bonds=float(np.log(crossing.min() / max(np.median(crossing), TINY) + 0.01)),
         )
-        found.append(LoopEvidence(facts, float(inside), view.centre, int(np.argmin(crossing))))
+        found.append(LoopEvidence(facts, view.centre, int(np.argmin(crossing))))
     return found
 
 

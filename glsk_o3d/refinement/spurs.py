@@ -66,9 +66,9 @@ def limb_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[int, di
     """What speaks for every branch that leaves a junction and has an end: its leaf, and facts.
 
     The facts are: how far its points (all but a tenth, and of a long limb those outside of its body) stand out of the
-    surface around the other limbs, over its own half width, as a logarithm, less the share of this that the object is
-    beside it, too; how certain it is, minus the logarithm of what its mean confidence lacks of 1; and how round the
-    part is at the junction.
+    surface around the other limbs, over its own half width, as a logarithm, of which the less counts above 0 the more
+    the object is beside it, too; how certain it is, minus the logarithm of what its mean confidence lacks of 1; and how
+    round the part is at the junction.
     """
     return ((twig.tip, twig.facts) for twig in _twigs(skeleton, evidence))
 
@@ -111,8 +111,9 @@ def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
         # by how far they are, and not as they come, which depends on how the object is turned
         points = own[np.argsort(norm(own - skeleton.vertices[junction]))][:: len(own) // SPUR_POINTS + 1]
         out = max(_standing_out(limbs, k, junction, points, ending), 0.0) if own_half > 0 else 0.0
+        protrusion = float(np.log(out / max(own_half, TINY) + LEAST_OUT))
         facts = dict(
-            protrusion=float(np.log(out / max(own_half, TINY) + LEAST_OUT) * (1 - shared)),
+            protrusion=protrusion - float(shared) * max(protrusion, 0),
             certainty=-float(np.log1p(-np.average(confidence[body], weights=count[body]))),
             roundness=float(roundness[junction]),
         )

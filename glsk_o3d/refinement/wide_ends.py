@@ -39,17 +39,16 @@ def _wide_end(path: np.ndarray, vertices: np.ndarray, width: np.ndarray, other: 
     """The last vertices of a path, from the neck before its widest place on; none if they are no wide end.
 
     The widest place is near the leaf, the neck a half width or more before it, and as far from an `other` leaf, since
-    rims are narrow. Behind the neck there are two vertices or more.
+    rims are narrow. It is the narrowest place there: where a limb widens, points of one side only may belong to the
+    curve. Behind the neck there are two vertices or more.
     """
     wide, places = width[path], vertices[path]
     top = int(np.argmax(np.where(norm(places - places[-1]) < STUB_LENGTH * wide, wide, 0)))
     thin = (WIDE_NECK * wide[:top] <= wide[top]) & (norm(places[:top] - places[top]) >= wide[top])
     thin &= (not other) | (norm(places[:top] - places[0]) >= wide[top])
-    neck = np.flatnonzero(thin)[-1:]
-    if not len(neck) or len(path) - neck[0] < 4:
-        return path[:0]
-    short = np.linalg.norm(places[-1] - places[neck[0]]) < STUB_LENGTH * wide[top]
-    return path[neck[0] :] if short else path[:0]
+    thin &= norm(places[:top] - places[-1]) < STUB_LENGTH * wide[top]
+    neck = int(np.argmin(np.where(thin, wide[:top], np.inf))) if thin.any() else len(path)
+    return path[neck:] if len(path) - neck > 3 else path[:0]
 
 
 def _levelled(skeleton: Skeleton, run: np.ndarray, surface: SurfaceGraph) -> Skeleton:

@@ -9,7 +9,8 @@ from glsk_o3d import Connector, Contractor, Report, pipelines, samples, skeleton
 from glsk_o3d.numerics.cycles import minimum_cycle_basis
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
 from glsk_o3d.numerics.winding import AREA_NEIGHBOURS
-from glsk_o3d.refinement.evidence import Evidence
+from glsk_o3d.refinement import spurs
+from glsk_o3d.refinement.evidence import LEAST_INSIDE, Evidence
 from glsk_o3d.refinement.loops import WIDE_OPEN, loop_facts
 from glsk_o3d.refinement.spurs import _beside, _outside
 from glsk_o3d.samples.capsules import union_sample
@@ -71,6 +72,17 @@ def test_one_sees_through_a_loop_if_no_surface_is_as_near_as_it_is_wide(piped, h
     cycles = minimum_cycle_basis(len(ring.vertices), ring.edges, ring.edge_lengths)
     (loop,) = loop_facts(ring, cycles, evidence_of(ring.points, ring.normals))
     assert (loop.facts["sight"] == WIDE_OPEN) if clear else (loop.facts["sight"] < 1)
+
+
+@pytest.mark.parametrize("inside", [1, 0.35, 0.01])
+def test_the_winding_number_falls_by_what_it_has_along_the_loop(piped, monkeypatch, inside):
+    """A ring as thin as its points are apart has little inside; a loop in air has none, and hardly falls."""
+    ring, full = piped(TORUS), Evidence.winding
+    cycles = minimum_cycle_basis(len(ring.vertices), ring.edges, ring.edge_lengths)
+    monkeypatch.setattr(Evidence, "winding", lambda self, places: inside * full(self, places))
+    (loop,) = loop_facts(ring, cycles, Evidence.of(ring))
+    assert loop.facts["fall"] == pytest.approx(min(inside / LEAST_INSIDE, 1), abs=0.05)
+    assert inside < 0.1 or loop.probability > 0.95
 
 
 @SIDES
@@ -138,6 +150,21 @@ def test_limbs_do_not_depend_on_how_the_object_is_turned(refine, placed):
     assert len(again[0]) > 4
     sure, also = (sorted(each.probability for each in decisions) for decisions in again)
     np.testing.assert_allclose(sure, also, atol=1e-6)
+
+
+def test_a_stub_in_a_flat_end_says_as_little_whatever_is_beside_it(piped, monkeypatch):
+    """Prongs of the curve in the end of a tube stand out of nothing; the tube does, if nothing is beside it."""
+    prongs = [[(0.9, 0, 0), (0.9, y, 0)] for y in (0.08, -0.08)]
+    bar = piped([[(-1, 0, 0), (0.9, 0, 0)], *prongs], around=TUBE, step=0.04)
+    evidence, facts = Evidence.of(bar), []
+    for shared in (0, 1):
+        monkeypatch.setattr(spurs, "_beside", lambda *given, shared=shared: np.full(len(given[3]), shared))
+        facts.append([each["protrusion"] for _, each in sorted(spurs.limb_facts(bar, evidence))])
+    apart, within = np.array(facts)
+    stub = apart < 0
+    assert stub.tolist() == [False, True, True]
+    np.testing.assert_array_equal(within[stub], apart[stub])
+    np.testing.assert_allclose(within[~stub], 0, atol=1e-12)
 
 
 def test_a_long_limb_is_judged_by_what_is_outside_of_its_body():
