@@ -63,7 +63,7 @@ def _asked(refiner: Refiner, raw: Skeleton, truth: Truth) -> Iterator[tuple[str,
     if cycles:
         placed = Placed(truth, skeleton.vertices)
         for cycle, loop in zip(cycles, loop_facts(skeleton, cycles, evidence), strict=True):
-            yield "loop", loop.facts, placed.is_handle(cycle)
+            yield "loop", loop.facts, placed.is_handle(cycle)  # also without an inside: of false ones there are few
     skeleton, _ = refiner._asked("loop", skeleton, evidence)
     yield from _limbs(skeleton, evidence, truth)
     skeleton, _ = refiner._asked("limb", skeleton, evidence)

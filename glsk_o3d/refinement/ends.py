@@ -54,7 +54,7 @@ def regrow_ends(skeleton: Skeleton) -> Skeleton:
     radius counts half, and those beyond the reach do not count. The fit is made three times, each along t + d of the
     one before. See `_End.tip` and `_End._cap` for where it stops. No end leaves its points.
 
-    New vertices come behind all others, with the confidence of the run behind and its radius, which falls to a neck's.
+    New vertices come behind all others, with the confidence of the run behind and the radii of their own sections.
     Points of a vertex that was cut belong to the nearest one of the same end. Loops and vertices without edges stay.
     """
     if not len(skeleton.leaves):
@@ -71,7 +71,6 @@ class _Grown(NamedTuple):
     cut: int  # number along the path of the first vertex that goes
     places: np.ndarray  # (k, 3), of the new vertices, outwards
     run: np.ndarray  # vertices behind the cut
-    thick: float  # largest radius of the last vertex
 
 
 def _ends(skeleton: Skeleton) -> Iterator[tuple[np.ndarray, int, bool]]:
@@ -124,13 +123,13 @@ def _grow(cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int,
         return None
     end = _End.of(points[ahead], cloud.normals[own[ahead]], way, radius)
     behind = _within(along, stop, END_SIZE * radius)
-    tip, thick = end.tip(_Taper.of(along[behind] - stop, radii[behind], radius))
+    tip = end.tip(_Taper.of(along[behind] - stop, radii[behind], radius))
     steps = np.diff(along[run])
     step = np.median(steps) if len(steps) else length / last
     tip = max(tip, step / 2)
     # edges of no length are those of no limb
     number = max(round(min(tip / max(step, TINY), len(points))), 1)
-    return _Grown(path, cut, anchor + end.curve(np.arange(1, number + 1) / number * tip), path[run], thick)
+    return _Grown(path, cut, anchor + end.curve(np.arange(1, number + 1) / number * tip), path[run])
 
 
 def _last(cloud: VertexPoints, path: np.ndarray, along: np.ndarray, first: int, other: bool) -> int:
@@ -216,15 +215,15 @@ class _End(NamedTuple):
         """Directions of the curve so far ahead, (k, 3) float array."""
         return self.way + np.interp(length, self.along, self.steps)[:, None] * self.bend
 
-    def tip(self, taper: _Taper) -> tuple[float, float]:
-        """How far the limb goes on, and the largest radius that it has there, infinite if it is not known.
+    def tip(self, taper: _Taper) -> float:
+        """How far the limb goes on.
 
         Where its last points are much nearer to the axis than it is thick, as on the neck of a bottle, it has the cap
         of that thinner limb.
         """
         reach = quantile(self.length, END_REACH)
         thin = self._thinner(taper.at(reach - taper.radius), reach)
-        return self._cap(taper if np.isinf(thin) else _Taper(thin, 0.0), reach), thin
+        return self._cap(taper if np.isinf(thin) else _Taper(thin, 0.0), reach)
 
     def _thinner(self, radius: float, reach: float) -> float:
         """Radius of the points nearer to the reach than it is, if much less than the limb's and they are all around."""
@@ -301,14 +300,13 @@ def _replanted(skeleton: Skeleton, grown: list[_Grown]) -> Skeleton:
     low, high = axis_box(skeleton.points[skeleton.supporting_points])
     edges, radii, confidence = [skeleton.edges], [skeleton.radii], [skeleton.confidence]
     planted = [np.clip(found.places, low, high) for found in grown]
-    for (path, cut, _, run, thick), places in zip(grown, planted, strict=True):
+    for (path, cut, _, run), places in zip(grown, planted, strict=True):
         gone, names = path[cut:], m + np.arange(len(places))
         m += len(places)
         keep[gone] = False
         chain = np.concatenate([path[cut - 1 : cut], names])
         edges.append(np.column_stack([chain[:-1], chain[1:]]))
-        radius = np.median(skeleton.radii[run])
-        radii.append(np.linspace(radius, min(radius, thick), len(places) + 1)[1:])
+        radii.append(np.full(len(places), np.median(skeleton.radii[run])))
         confidence.append(np.full(len(places), np.median(skeleton.confidence[run])))
         lost = members.of(gone)
         near = cKDTree(np.concatenate([skeleton.vertices[chain[:1]], places])).query(skeleton.points[lost])[1]
@@ -323,4 +321,7 @@ def _replanted(skeleton: Skeleton, grown: list[_Grown]) -> Skeleton:
         confidence=np.concatenate(confidence)[keep],
         vertex_of_point=np.append(number, -1)[owner],
     )
-    return replace(skeleton, **NOT_MEASURED | made)
+    planted = replace(skeleton, **NOT_MEASURED | made)
+    section = measure_sections(planted).radius
+    new = (np.flatnonzero(keep) >= len(skeleton.vertices)) & (section > 0)
+    return replace(planted, radii=np.where(new, section, planted.radii))

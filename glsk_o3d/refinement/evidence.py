@@ -20,7 +20,7 @@ from ..numerics.winding import AREA_NEIGHBOURS, orient_from_axis, point_areas, w
 from ..skeleton import Skeleton
 from .merging import with_fields
 
-# fitted: winding number below which an axis is in nothing; .5 on that of a tube seen from one side, .2 in sparse crowns
+# fitted: winding number below which an axis is in little; .5 on that of a tube seen from one side, .2 in sparse crowns
 LEAST_INSIDE = 0.4
 
 # measured: points of one object beyond which a surface hangs together in the same way, and noisy ones down to about

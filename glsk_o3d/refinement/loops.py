@@ -56,13 +56,14 @@ class LoopEvidence(NamedTuple):
     """What speaks for and against that a loop is a handle."""
 
     facts: dict[str, float]
+    inside: float  # median winding number along it
     centre: np.ndarray  # of its hole
     weakest: int  # position of the edge, from there to the next vertex, that the fewest bonds cross
 
     @property
     def probability(self) -> float:
-        """That it is one."""
-        return QUESTIONS["loop"].probability(self.facts)
+        """That it is one: what the facts say, and less where it has little inside, nothing as in sparse crowns."""
+        return QUESTIONS["loop"].probability(self.facts) * float(np.clip(2 * self.inside / LEAST_INSIDE - 1, 0, 1))
 
 
 def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> list[LoopEvidence]:
@@ -89,10 +90,10 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
         facts = dict(
             opening=float(np.log(min(view.radius, WIDE_OPEN * tube) / tube + 0.1)),
             sight=min(view.sight, WIDE_OPEN),
-            fall=float((inside - outside) / max(inside, LEAST_INSIDE)),
+            fall=float(1 - outside / max(inside, LEAST_INSIDE)),
             bonds=float(np.log(crossing.min() / max(np.median(crossing), TINY) + 0.01)),
         )
-        found.append(LoopEvidence(facts, view.centre, int(np.argmin(crossing))))
+        found.append(LoopEvidence(facts, float(inside), view.centre, int(np.argmin(crossing))))
     return found
 
 

@@ -66,9 +66,9 @@ def limb_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[int, di
     """What speaks for every branch that leaves a junction and has an end: its leaf, and facts.
 
     The facts are: how far its points (all but a tenth, and of a long limb those outside of its body) stand out of the
-    surface around the other limbs, over its own half width, as a logarithm, of which the less counts above 0 the more
-    the object is beside it, too; how certain it is, minus the logarithm of what its mean confidence lacks of 1; and how
-    round the part is at the junction.
+    surface around the other limbs, over its own half width, as a logarithm, of which, if positive, the share is left
+    out that has the object beside it; how certain it is, minus the logarithm of what its mean confidence lacks of 1;
+    and how round the part is at the junction.
     """
     return ((twig.tip, twig.facts) for twig in _twigs(skeleton, evidence))
 

@@ -38,14 +38,15 @@ def level_wide_ends(skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
 def _wide_end(path: np.ndarray, vertices: np.ndarray, width: np.ndarray, other: bool) -> np.ndarray:
     """The last vertices of a path, from the neck before its widest place on; none if they are no wide end.
 
-    The widest place is near the leaf, the neck a half width or more before it, and as far from an `other` leaf, since
-    rims are narrow. It is the narrowest place there: where a limb widens, points of one side only may belong to the
-    curve. Behind the neck there are two vertices or more.
+    The widest place is near the leaf. The neck is the narrowest place a half width or more before that, at most half
+    as wide, not much farther from the leaf than the end is wide, and not at an `other` leaf, since rims are narrow,
+    too. Where a limb widens, points of one side only may belong to the curve. Behind the neck there are two vertices
+    or more.
     """
     wide, places = width[path], vertices[path]
     top = int(np.argmax(np.where(norm(places - places[-1]) < STUB_LENGTH * wide, wide, 0)))
     thin = (WIDE_NECK * wide[:top] <= wide[top]) & (norm(places[:top] - places[top]) >= wide[top])
-    thin &= (not other) | (norm(places[:top] - places[0]) >= wide[top])
+    thin &= (not other) | (WIDE_NECK * norm(places[:top] - places[0]) >= wide[top])
     thin &= norm(places[:top] - places[-1]) < STUB_LENGTH * wide[top]
     neck = int(np.argmin(np.where(thin, wide[:top], np.inf))) if thin.any() else len(path)
     return path[neck:] if len(path) - neck > 3 else path[:0]

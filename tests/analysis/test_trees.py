@@ -135,7 +135,7 @@ def test_loops_and_lone_points_have_none():
         cylinders(by_hand(radius=np.nan))
 
 
-@pytest.mark.filterwarnings("ignore:uncertain topology")  # one of its sixty questions may be a close call
+@pytest.mark.filterwarnings("ignore:uncertain topology")  # twigs that stray points join are close calls
 def test_outliers_have_no_say():
     points = samples.tree(4096, forks=6, seed=0).points
     strays = np.random.default_rng(0).uniform(points.min(axis=0), points.max(axis=0), (5, 3))

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 from glsk_o3d import Skeleton, skeletonize
 from glsk_o3d.refinement.axis_fit import fit_axis
 from glsk_o3d.refinement.evidence import SurfaceGraph
-from glsk_o3d.refinement.wide_ends import level_wide_ends
+from glsk_o3d.refinement.wide_ends import _wide_end, level_wide_ends
 
 
 def paddle(n=4000, disc=0.25, handle=0.04, thick=0.03, seed=0):
@@ -63,6 +63,16 @@ def test_other_ends_stay_as_they_are():
     points, normals = paddle(handle=0.02)
     given, found = led(np.column_stack([6 * x, 0 * x, 0 * x]), points * [6, 1, 1], normals)
     assert found is given
+
+
+@pytest.mark.parametrize(("waist", "first"), [(3, 3), (6, 6), (0, 2)])
+def test_a_wide_end_begins_at_the_narrowest_place(waist, first):
+    """But not at the tip of a handle, which is narrow, too."""
+    along, width = np.arange(14.0), np.r_[np.full(9, 1.0), 2.0, 3.5, 4.0, 4.0, 3.0]
+    width[waist] = 0.5
+    width[2] = min(width[2], 0.9)
+    run = _wide_end(np.arange(14), along[:, None] * [1, 0, 0], width, True)
+    np.testing.assert_array_equal(run, np.arange(first, 14))
 
 
 def test_both_ends_may_be_wide():
