@@ -222,12 +222,12 @@ class _End(NamedTuple):
         of that thinner limb.
         """
         reach = quantile(self.length, END_REACH)
-        thin = self._thinner(taper.at(reach - taper.radius), reach)
-        return self._cap(taper if np.isinf(thin) else _Taper(thin, 0.0), reach)
+        return self._cap(self._thinner(taper, reach), reach)
 
-    def _thinner(self, radius: float, reach: float) -> float:
-        """Radius of the points nearer to the reach than it is, if much less than the limb's and they are all around."""
-        given, centre = radius, np.zeros(3)
+    def _thinner(self, taper: _Taper, reach: float) -> _Taper:
+        """The limb of the last points, if they are much nearer to the axis than it is thick, and all around it."""
+        radius = given = taper.at(reach - taper.radius)
+        centre = np.zeros(3)
         for _ in range(END_ROUNDS):
             late = self.length > reach - radius
             if late.sum() < END_POINTS:
@@ -239,11 +239,11 @@ class _End(NamedTuple):
             centre = away.mean(axis=0)
             sides = dot(normals, normals).sum()
             if sides < END_SIDES * late.sum():
-                return np.inf
+                return taper
             across = norm(normals) @ np.abs(dot(away, normals)) / max(sides, TINY)
             radius = min(radius, float(across))
         around = np.linalg.norm(centre) < ONE_SIDED * radius
-        return radius if around and radius < END_THINNER * given else np.inf
+        return _Taper(radius, 0.0) if around and radius < END_THINNER * given else taper
 
     def _cap(self, taper: _Taper, reach: float) -> float:
         """How far it is to half a radius inside a flat cap, or to the centre of a round one.
@@ -321,7 +321,8 @@ def _replanted(skeleton: Skeleton, grown: list[_Grown]) -> Skeleton:
         confidence=np.concatenate(confidence)[keep],
         vertex_of_point=np.append(number, -1)[owner],
     )
-    planted = replace(skeleton, **NOT_MEASURED | made)
-    section = measure_sections(planted).radius
-    new = (np.flatnonzero(keep) >= len(skeleton.vertices)) & (section > 0)
-    return replace(planted, radii=np.where(new, section, planted.radii))
+    replanted = replace(skeleton, **NOT_MEASURED | made)
+    section = measure_sections(replanted).radius
+    new = np.flatnonzero(keep) >= len(skeleton.vertices)
+    # without points a vertex has no section, and keeps the radius of the run
+    return replace(replanted, radii=np.where(new & (section > 0), section, replanted.radii))

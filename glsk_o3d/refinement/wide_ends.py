@@ -48,7 +48,9 @@ def _wide_end(path: np.ndarray, vertices: np.ndarray, width: np.ndarray, other: 
     thin = (WIDE_NECK * wide[:top] <= wide[top]) & (norm(places[:top] - places[top]) >= wide[top])
     thin &= (not other) | (WIDE_NECK * norm(places[:top] - places[0]) >= wide[top])
     thin &= norm(places[:top] - places[-1]) < STUB_LENGTH * wide[top]
-    neck = int(np.argmin(np.where(thin, wide[:top], np.inf))) if thin.any() else len(path)
+    if not thin.any():
+        return path[:0]
+    neck = np.argmin(np.where(thin, wide[:top], np.inf))
     return path[neck:] if len(path) - neck > 3 else path[:0]
 
 

@@ -12,7 +12,6 @@ from glsk_o3d.numerics.winding import AREA_NEIGHBOURS
 from glsk_o3d.refinement import spurs
 from glsk_o3d.refinement.evidence import LEAST_INSIDE, Evidence
 from glsk_o3d.refinement.loops import WIDE_OPEN, loop_facts
-from glsk_o3d.refinement.spurs import _beside, _outside
 from glsk_o3d.samples.capsules import union_sample
 
 X, Y, Z = np.eye(3)
@@ -130,7 +129,7 @@ def test_the_object_is_beside_a_strand_and_nothing_beside_a_limb(turn):
     strand, width = np.array([[0, t, 0] for t in (0, 0.2, 0.8)]), np.tile([1.0, 0, 0], (3, 1))
     flat = evidence_of(plate @ turn, out @ turn)
     # it has no rim
-    assert _beside(flat, strand @ turn, width @ turn, [np.arange(3)], np.array([0.3])) > 0.65
+    assert spurs._beside(flat, strand @ turn, width @ turn, [np.arange(3)], np.array([0.3])) > 0.65
     along, t = (grid.ravel() for grid in np.mgrid[-2:2:0.08, 0 : 2 * np.pi : 0.26])
     tube = np.column_stack([along, 0.3 * np.cos(t), 0.3 * np.sin(t)])
     out = np.column_stack([np.zeros(len(t)), np.cos(t), np.sin(t)])
@@ -138,7 +137,7 @@ def test_the_object_is_beside_a_strand_and_nothing_beside_a_limb(turn):
     # vertices without points have a width along the limb, if need be
     for wide in (width, np.tile([1.0, 0, 0], (2, 1))):
         around = evidence_of(tube @ turn, out @ turn)
-        assert _beside(around, limb @ turn, wide @ turn, [np.arange(2)], np.array([0.3])) < 0.05
+        assert spurs._beside(around, limb @ turn, wide @ turn, [np.arange(2)], np.array([0.3])) < 0.05
 
 
 def test_limbs_do_not_depend_on_how_the_object_is_turned(refine, placed):
@@ -169,10 +168,10 @@ def test_a_stub_in_a_flat_end_says_as_little_whatever_is_beside_it(piped, monkey
 def test_a_long_limb_is_judged_by_what_is_outside_of_its_body():
     path, half = np.arange(11)[::-1], np.full(11, 0.1)
     vertices = np.arange(11)[::-1, None] / 10 * Z  # from the junction, vertex 10, a tenth each
-    np.testing.assert_array_equal(_outside(vertices, path, 0.45, half), [5, 4, 3, 2, 1, 0])
-    np.testing.assert_array_equal(_outside(vertices, path, 0.65, half), path[1:])  # not twice as long as wide
-    np.testing.assert_array_equal(_outside(vertices, path, 1.5, half), path[1:])
-    np.testing.assert_array_equal(_outside(vertices, path, 0.0, half), path[1:])
+    np.testing.assert_array_equal(spurs._outside(vertices, path, 0.45, half), [5, 4, 3, 2, 1, 0])
+    np.testing.assert_array_equal(spurs._outside(vertices, path, 0.65, half), path[1:])  # not twice as long as wide
+    np.testing.assert_array_equal(spurs._outside(vertices, path, 1.5, half), path[1:])
+    np.testing.assert_array_equal(spurs._outside(vertices, path, 0.0, half), path[1:])
 
 
 @pytest.mark.parametrize("seed", [0, 1])
