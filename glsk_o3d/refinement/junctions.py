@@ -5,12 +5,14 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from ..numerics.polylines import arc_lengths, place_at, relative_distance
 from ..numerics.vectors import TINY, dot
 from ..skeleton import Skeleton
 from .axis_fit import FIT_STAY, axis_box
-from .limbs import AXIS_LEAVES, AXIS_LENGTH, Limbs
+from .handles import Handles
+from .limbs import AXIS_LEAVES, AXIS_LENGTH, Limbs, Line
 from .merging import merge_into, with_fields
 from .sections import VertexPoints
 
@@ -21,18 +23,6 @@ LINE_STEPS = 400  # derived: places at most
 SURFACE_WEIGHT = 12.0  # of the surface that fits a sphere, over that of a line that says exactly where it is
 SURFACE_FIT = 0.25  # distance from the sphere, over the radius, at which a point counts half
 MEETING_ROUNDS = 10  # precision: from then on hardly anything moves
-
-
-class Line(NamedTuple):
-    """What a limb says of where it comes from."""
-
-    middle: np.ndarray  # (3,) of the part that nothing disturbs
-    way: np.ndarray  # (3,) unit vector towards the junction, or zero
-    spread: float  # standard deviation along the line of that part
-    bend: float  # root mean square distance from the line
-    start: float  # length along the limb that is disturbed
-    anchor: np.ndarray  # (3,) where that ends
-    radius: float  # of the limb
 
 
 class _Place(NamedTuple):
@@ -52,40 +42,55 @@ def move_junctions(skeleton: Skeleton) -> Skeleton:
     weights, so that the place moves little if the points do. Of two junctions that are then less than a radius apart,
     nearest first, one is made, unless a loop would close.
 
+    Handles are followed to the wall of their body, see `Handles`, and go straight on from there to the place nearest to
+    where the junction is. A body on which a single handle begins and ends has no junction: its middle is one for that.
+    The points there belong to the vertex to which they are nearest, less its radius.
+
     Returns
     -------
     Skeleton
         With other places of the junctions and of the vertices beside them, perhaps fewer.
     """
-    while len(skeleton.junctions):
-        limbs = Limbs(skeleton)
-        places = _places(skeleton, limbs)
+    while True:
+        handles = Handles(skeleton)
+        if not len(skeleton.junctions) and not handles.bodies:
+            return skeleton
+        limbs = Limbs(skeleton, np.array([*handles.bodies], int))
+        places = _places(skeleton, limbs, handles)
         merged = _merged(skeleton, limbs, places)
         if merged is None:
             return _straightened(skeleton, limbs, places)
         skeleton = merged
-    return skeleton
 
 
-def _places(skeleton: Skeleton, limbs: Limbs) -> dict[int, _Place]:
+def _places(skeleton: Skeleton, limbs: Limbs, handles: Handles) -> dict[int, _Place]:
     """Where every junction belongs."""
     cloud = VertexPoints(skeleton)
     low, high = axis_box(cloud.points if len(cloud.points) else skeleton.vertices)
     found = {}
-    for junction in skeleton.junctions.tolist():
+    for junction in sorted(limbs.at):
         here, lines, radius, around = limbs.at[junction], [], 0.0, []
         for limb in here:
             path, along = limbs.paths[limb], arc_lengths(limbs.vertices[limbs.paths[limb]])
             others = [limbs.paths[k] for k in here if limbs.branch[k] != limbs.branch[limb]]
-            line = limb_line(limbs.vertices, limbs.surface, path, limbs.radius[limbs.branch[limb]], others)
+            radius_of = limbs.radius[limbs.branch[limb]]
+            line = handles.follow(path, others) or limb_line(limbs.vertices, limbs.surface, path, radius_of, others)
             lines.append(line)
             radius = max(radius, float(np.interp(line.start, along, limbs.surface[path])))
             around.append(path[along <= along[-1] / 2])
         own = cloud.members.of(np.unique(np.concatenate(around)))
         place, touching = meet(lines, skeleton.vertices[junction], radius, cloud.points[own], cloud.normals[own])
-        # normals that mean nothing may meet anywhere
-        found[junction] = _Place(np.clip(place, low, high), touching, lines)
+        place = np.clip(handles.bodies.get(junction, place), low, high)  # normals that mean nothing may meet anywhere
+        found[junction] = _Place(place, touching, [_entering(line, place) for line in lines])
     return found
+
+
+def _entering(line: Line, place: np.ndarray) -> Line:
+    """A line with the way of a handle through its body: straight on to the place nearest to the middle."""
+    if len(line.lead) == 1:
+        return line
+    wall = line.lead[:1]
+    return line._replace(lead=np.concatenate([wall + max((place - wall[0]) @ line.way, 0) * line.way, line.lead]))
 
 
 def _merged(skeleton: Skeleton, limbs: Limbs, places: dict[int, _Place]) -> Skeleton | None:
@@ -114,25 +119,39 @@ def _merged(skeleton: Skeleton, limbs: Limbs, places: dict[int, _Place]) -> Skel
 def _straightened(skeleton: Skeleton, limbs: Limbs, places: dict[int, _Place]) -> Skeleton:
     """Put junctions in their places, and the disturbed parts of limbs on straight lines from there."""
     vertices, radii = skeleton.vertices.copy(), skeleton.radii.copy()
+    confidence, owner = skeleton.confidence.copy(), skeleton.vertex_of_point.copy()
     for junction, (place, _, lines) in places.items():
         vertices[junction] = place
-        radii[junction] = 0
+        radii[junction], entering = 0, list[np.ndarray]()
         for limb, line in zip(limbs.at[junction], lines, strict=True):
             path = limbs.paths[limb]
             along = arc_lengths(skeleton.vertices[path])
-            start, anchor = line.start, line.anchor
-            if (anchor - place) @ line.way > 0:  # the place lies ahead of where the limb is joined: it would turn back
+            start, lead = line.start, line.lead
+            # the place lies ahead of where the limb is joined: it would turn back
+            if (lead[-1] - place) @ line.way > 0:
                 ahead = np.flatnonzero((along > start) & ((skeleton.vertices[path] - place) @ line.way < 0))
                 if len(ahead):
-                    start, anchor = along[ahead[0]], skeleton.vertices[path[ahead[0]]]
+                    start, lead = along[ahead[0]], skeleton.vertices[path[ahead[:1]]]
             moved = np.flatnonzero((along > 0) & (along < start))
-            share = (along[moved] / max(start, TINY))[:, None]
-            vertices[path[moved]] = (1 - share) * place + share * anchor
+            lead = np.concatenate([[place], lead])
+            lengths = arc_lengths(lead)
+            there = along[moved] / max(start, TINY) * lengths[-1]
+            vertices[path[moved]] = place_at(lead, lengths, there)
             # a junction owns points of everything around: what it measured itself does not count
             radius = np.interp(start, along, skeleton.radii[path])
             radii[path[moved]] = radius
+            if len(lead) > 2:  # but what a body measured does
+                inside, radius = path[moved[there < lengths[1]]], skeleton.radii[junction]
+                confidence[path[moved]] = np.interp(start, along, skeleton.confidence[path])
+                radii[inside], confidence[inside] = radius, skeleton.confidence[junction]
+                entering.append(path[moved])
             radii[junction] = max(radii[junction], radius)
-    return with_fields(skeleton, vertices=vertices, radii=radii)
+        if entering:
+            chain = np.concatenate([[junction], *entering])
+            own = np.flatnonzero(np.isin(owner, chain))
+            away = cdist(skeleton.points[own], vertices[chain]) - radii[chain]
+            owner[own] = chain[away.argmin(axis=1)]
+    return with_fields(skeleton, vertices=vertices, radii=radii, confidence=confidence, vertex_of_point=owner)
 
 
 def limb_line(
@@ -161,14 +180,14 @@ def limb_line(
     weight = clear * np.clip(1.5 - np.cumsum(clear) * step / max(AXIS_LENGTH * radius, TINY), 0, 1)
     total = weight.sum()
     if total * step <= 0:
-        return Line(anchor, np.zeros(3), 0.0, 0.0, start, anchor, radius)
+        return Line(anchor, np.zeros(3), 0.0, 0.0, start, anchor[None], radius)
     weight /= total
     middle, mean = weight @ curve, weight @ at
     way = (weight * (mean - at)) @ (curve - middle)
     way /= max(np.linalg.norm(way), TINY)
     off = curve - middle - (mean - at)[:, None] * way
     spread, bend = np.sqrt(weight @ (at - mean) ** 2), np.sqrt(weight @ dot(off, off))
-    return Line(middle, way, float(spread), float(bend), start, anchor, radius)
+    return Line(middle, way, float(spread), float(bend), start, anchor[None], radius)
 
 
 def meet(

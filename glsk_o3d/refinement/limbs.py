@@ -2,6 +2,8 @@
 
 from collections import defaultdict
 from functools import cache
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,26 +19,53 @@ AXIS_LEAVES = 1.3  # distance from the other limbs, over that from them to the s
 AXIS_LENGTH = 2.0  # radii from there, or from where an end is cut, over which its line is taken
 
 
+class Line(NamedTuple):
+    """What a limb says of where it comes from."""
+
+    middle: np.ndarray  # (3,) of the part that nothing disturbs
+    way: np.ndarray  # (3,) unit vector towards the junction, or zero
+    spread: float  # standard deviation along the line of that part
+    bend: float  # root mean square distance from the line
+    start: float  # length along the limb that is disturbed
+    lead: np.ndarray  # (k, 3) where the limb goes there, from its junction on, up to where that ends
+    radius: float  # of the limb
+
+
+def _split(branch: np.ndarray, joint: np.ndarray) -> list[np.ndarray]:
+    """The parts of a branch between joints; a closed one begins at one of them."""
+    inner = np.flatnonzero(joint[branch])
+    if branch[0] == branch[-1] and len(inner) and not joint[branch[0]]:
+        branch = np.concatenate([branch[inner[0] :], branch[1 : inner[0] + 1]])
+        inner = np.flatnonzero(joint[branch])
+    cuts = np.unique(np.concatenate([[0], inner, [len(branch) - 1]]))
+    return [branch[a : b + 1] for a, b in pairwise(cuts)]
+
+
 class Limbs:
     """The branches of a skeleton seen from their junctions.
 
     The `surface` (M,) is as far from every vertex; without points, its radius. Of every branch there is the `radius`
     (B,), the median of that along it, and whether it is `inner` (B,), between two junctions. The `paths` lead from
-    every junction along its branches, those `at` it; `branch` has the number of the branch of each.
+    every junction along its branches, those `at` it; `branch` has the number of the branch of each. Other vertices may
+    be `joints`, too, int array, where branches are split.
     """
 
-    def __init__(self, skeleton: Skeleton) -> None:
+    def __init__(self, skeleton: Skeleton, joints: np.ndarray | None = None) -> None:
         self.vertices, degree = skeleton.vertices, skeleton.degree
         surface = VertexPoints(skeleton).distance
         self.surface = np.where(surface > 0, surface, skeleton.radii)
         self.branches = skeleton.branches
+        joint = degree > 2
+        if joints is not None and len(joints):
+            joint[joints] = True
+            self.branches = tuple(part for branch in self.branches for part in _split(branch, joint))
         ends = np.array([branch[[0, -1]] for branch in self.branches], int).reshape(-1, 2)
         self.radius = np.array([quantile(self.surface[branch]) for branch in self.branches], float)
         self.inner = (degree[ends] > 2).all(axis=1) & (ends[:, 0] != ends[:, 1])
         self.paths, self.branch, self.at = list[np.ndarray](), list[int](), defaultdict[int, list[int]](list)
         for number, branch in enumerate(self.branches):
             for path in (branch, branch[::-1]):
-                if degree[path[0]] > 2:
+                if joint[path[0]]:
                     self.at[int(path[0])].append(len(self.paths))
                     self.paths.append(path)
                     self.branch.append(number)

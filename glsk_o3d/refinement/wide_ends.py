@@ -23,16 +23,24 @@ def level_wide_ends(skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
     is the way ahead told by the limb, which meets a pan at an angle. The bands know the way from the neck to the rim,
     and their means hardly depend on the points. Balls on a neck are wide ends, too.
     """
-    # where normals mean nothing, as on scan lines, the points here or beside are farther away than the half width
-    away, (a, b) = VertexPoints(skeleton).distance, skeleton.edges.T
-    width = np.fmax(measure_sections(skeleton).half_width, away)
-    np.maximum.at(width, np.concatenate([a, b]), away[np.concatenate([b, a])])
+    width = half_widths(skeleton)
     leaf = skeleton.degree == 1
     for branch in skeleton.branches:
         for path in (branch, branch[::-1]):
             if leaf[path[-1]] and len(run := _wide_end(path, skeleton.vertices, width, bool(leaf[path[0]]))):
                 skeleton = _levelled(skeleton, run, surface)
     return skeleton
+
+
+def half_widths(skeleton: Skeleton) -> np.ndarray:
+    """Half width of the section at every vertex, or the distance to its points or those beside it, (M,) float array.
+
+    Where normals mean nothing, as on scan lines, points are farther away than the half width.
+    """
+    away, (a, b) = VertexPoints(skeleton).distance, skeleton.edges.T
+    width = np.fmax(measure_sections(skeleton).half_width, away)
+    np.maximum.at(width, np.concatenate([a, b]), away[np.concatenate([b, a])])
+    return width
 
 
 def _wide_end(path: np.ndarray, vertices: np.ndarray, width: np.ndarray, other: bool) -> np.ndarray:

@@ -1,0 +1,172 @@
+"""Follow handles to the body that they are on: those of a mug, a pot, a bucket."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..numerics.groups import component_labels, quantile
+from ..numerics.polylines import arc_lengths
+from ..numerics.vectors import TINY, Floats, cross, dot, norm, unit
+from ..skeleton import Skeleton
+from .axis_fit import FIT_STAY
+from .diagnostics import STUB_LENGTH
+from .limbs import Line
+from .sections import Sections, VertexPoints, half_axes, measure_sections, normal_moments
+from .wide_ends import half_widths
+
+HANDLE_THIN = 4.0  # fitted: half width of a body over that of its handle, at least; with 2.5 the scores are the same
+HANDLE_EVEN = 1.5  # fitted: its usual radius, times which a section of a handle is no longer its own
+HANDLE_BACK = 2.0  # fitted: radii behind the last section of its own where the handle is followed from
+HANDLE_STEP = 0.5  # fitted: radii from one section to the next
+HANDLE_FIT = 0.25  # fitted: radii from where it should be at which a tangent plane counts half
+HANDLE_BALL = 1.5  # fitted: half widths from the axis within which points may be the handle's
+HANDLE_OPEN = 2 / np.pi  # derived: length of the mean outward normal of half a tube; of more, nothing closes around it
+HANDLE_POINTS = 4  # derived: fewer say nothing of a section
+HANDLE_ROUNDS = 2  # measured: from then on hardly anything moves
+
+
+class Handles:
+    """The handles of a skeleton: parts of loops that leave a body at least four times as wide."""
+
+    def __init__(self, skeleton: Skeleton) -> None:
+        self.skeleton, self.cloud = skeleton, VertexPoints(skeleton)
+
+    @cached_property
+    def _any(self) -> bool:
+        return self.skeleton.n_loops > 0 and len(self.cloud.points) > 0
+
+    @cached_property
+    def _width(self) -> Floats:
+        return half_widths(self.skeleton)
+
+    @cached_property
+    def _sections(self) -> Sections:
+        return measure_sections(self.skeleton)
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.cloud.points)
+
+    @cached_property
+    def bodies(self) -> dict[int, Floats]:
+        """Centres of the bodies on which one handle begins and ends, by the vertex nearest to each.
+
+        On such a body the loop is hardly longer than wide.
+        """
+        found: dict[int, Floats] = {}
+        if not self._any:
+            return found
+        vertices, degree = self.skeleton.vertices, self.skeleton.degree
+        for branch in self.skeleton.branches:
+            if degree[branch[0]] == 2:  # a ring begins anywhere
+                ring = branch[:-1]
+                branch = np.roll(ring, len(ring) // 2 - int(np.argmax(self._width[ring])))
+            wide = self._width[branch]
+            top = int(np.argmax(wide))
+            thin = np.flatnonzero((HANDLE_THIN * wide <= wide[top]) & (self.cloud.count[branch] > 0))
+            before, after = thin[thin < top], thin[thin > top]
+            if not len(before) or not len(after):
+                continue
+            apart = np.linalg.norm(vertices[branch[after[0]]] - vertices[branch[before[-1]]])
+            body = branch[before[-1] + 1 : after[0]]
+            own = self.cloud.members.of(body)
+            if apart < STUB_LENGTH * wide[top] and len(own) and self._on_loop(branch):
+                centre = self.cloud.points[own].mean(axis=0)
+                found[int(body[norm(vertices[body] - centre).argmin()])] = centre
+        return found
+
+    def _on_loop(self, path: np.ndarray) -> bool:
+        """Whether the ends of a branch, or of a part of one, are connected without it."""
+        if path[0] == path[-1]:
+            return True
+        edges = self.skeleton.edges
+        gone = np.isin(edges, path[1:-1]).any(axis=1) if len(path) > 2 else np.isin(edges, path).all(axis=1)
+        label = component_labels(len(self.skeleton.vertices), edges[~gone])
+        return bool(label[path[0]] == label[path[-1]])
+
+    def follow(self, path: np.ndarray, others: list[np.ndarray]) -> Line | None:
+        """Follow a limb from where it is undisturbed to the body where its path begins; None if it is no handle there.
+
+        The body is as wide there as the widest place of it or of `others`, the paths that begin there, too, whose
+        section reaches the beginning.
+        """
+        if not self._any:
+            return None
+        vertices, cloud = self.skeleton.vertices, self.cloud
+        around = np.concatenate([path, *others])
+        around = around[norm(vertices[around] - vertices[path[0]]) <= self._width[around]]
+        thin = (HANDLE_THIN * self._width[path] <= self._width[around].max(initial=0)) & (cloud.count[path] > 0)
+        run = np.flatnonzero(thin)
+        if len(run):  # the first of several
+            wide = np.flatnonzero(~thin[run[0] :] & (cloud.count[path[run[0] :]] > 0))
+            run = run[run < run[0] + (wide[0] if len(wide) else len(path))]
+        radius = quantile(self._sections.radius[path[run]]) if len(run) else 0.0
+        size = np.maximum(self._sections.radius, cloud.distance)[path[run]]
+        run = run[size < HANDLE_EVEN * radius]
+        if len(run) < HANDLE_POINTS or not self._on_loop(path):
+            return None
+        places = vertices[path]
+        along = arc_lengths(places)
+        begin = int(np.searchsorted(along, min(along[run[0]] + HANDLE_BACK * radius, along[run].mean())))
+        behind, ahead = min(begin + 2, len(path) - 1), max(begin - 2, 0)
+        centre = self.bodies.get(int(path[0]), places[0])
+        half_width, half_thickness = (quantile(half[path[run]]) for half in self._sections[:2])
+        found, way = self._followed(
+            float(np.linalg.norm(places[begin] - centre)),
+            places[begin],
+            unit(places[[ahead]] - places[[behind]])[0],
+            half_width,
+            half_thickness,
+            self._sections.across[path[begin]],
+        )
+        if len(found) < 2:
+            return None
+        return Line(found[-1], way, radius, 0.0, float(along[begin]), found[::-1], radius)
+
+    def _followed(
+        self, far: float, place: Floats, way: Floats, half_width: float, half_thickness: float, across: Floats
+    ) -> tuple[Floats, Floats]:
+        """Follow a handle from a place, at most so far, while its sections close around it.
+
+        Returned are the centres of the sections, (k, 3) float array, that place first, and the direction of the last.
+        It is that of which the normals around have the least share, and the centre is nearest to the planes that they
+        span with it, as in `fit_axis`. A point counts by how nearly its tangent plane touches an ellipse with the half
+        axes of the handle, so that the wall of the body hardly does.
+        """
+        radius = max(np.sqrt(half_width * half_thickness), TINY)
+        found = [place]
+        for _ in range(int(far / (HANDLE_STEP * radius))):
+            centre, turned = found[-1] + HANDLE_STEP * radius * way, way
+            near = self._tree.query_ball_point(centre, np.hypot(radius, HANDLE_BALL * half_width))
+            points, normals = self.cloud.points[near], self.cloud.normals[near]
+            for fits in range(HANDLE_ROUNDS + 1):
+                offset = points - centre
+                along, lean, side = offset @ turned, (normals @ turned) ** 2, (normals @ across) ** 2
+                aside = offset - along[:, None] * turned
+                height = dot(normals, aside)
+                due = np.sqrt(half_width**2 * side + half_thickness**2 * np.maximum(1 - lean - side, 0))
+                weight = np.maximum(1 - (along / radius) ** 2, 0) * np.maximum(1 - 2 * lean, 0)
+                weight /= 1 + ((np.abs(height) - due) / (HANDLE_FIT * radius)) ** 2
+                weight *= norm(aside) < HANDLE_BALL * half_width
+                if fits == HANDLE_ROUNDS or np.count_nonzero(weight) < HANDLE_POINTS:
+                    break
+                stay = FIT_STAY * weight.sum() * np.eye(3)
+                squares = (weight[:, None] * normals).T @ normals + stay @ (np.eye(3) - np.outer(turned, turned))
+                turn = np.linalg.eigh(squares)[1][:, 0]
+                turn = turn if turn @ turned > 0 else -turn
+                planes = cross(normals, turn[None])
+                pull = (weight[:, None] * planes).T @ planes
+                step = np.linalg.solve(pull + stay, (weight * dot(planes, offset)) @ planes)
+                centre = centre + step - (step @ turn) * turn
+                turned = unit((turned + turn)[None])[0]
+                moments = weight @ normal_moments(normals, points - centre)
+                across = half_axes(moments[None], np.array([radius])).across[0]
+            outward = np.linalg.norm(np.copysign(weight, height) @ normals)
+            if np.count_nonzero(weight) < HANDLE_POINTS or outward > HANDLE_OPEN * weight.sum():
+                break
+            found.append(centre)
+            way = turned
+        return np.array(found), way

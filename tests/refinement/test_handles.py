@@ -1,0 +1,45 @@
+"""Handles: their curves keep to their axes up to the wall of the body, and go straight on to its middle."""
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from glsk_o3d import skeletonize
+from glsk_o3d.samples.capsules import union_sample
+
+BODY, HANDLE, REACH = 0.4, 0.06, 0.28
+TURN = np.linspace(-np.pi / 2, np.pi / 2, 17)
+
+
+def bow(side=1):
+    """The axis of a handle, from one place to another inside a body along z."""
+    return np.column_stack([side * (0.38 + REACH * np.cos(TURN)), 0 * TURN, REACH * np.sin(TURN)])
+
+
+def pot(sides, seed=0):
+    """Points of a body with handles on some sides, and no other ends."""
+    nodes, edges, radii = [np.array([[0, 0, -0.35], [0, 0, 0.35]])], [np.array([[0, 1]])], [[BODY, BODY]]
+    for side in sides:
+        k = sum(map(len, nodes)) + np.arange(len(TURN))
+        nodes.append(bow(side))
+        edges.append(np.column_stack([k[:-1], k[1:]]))
+        radii.append([HANDLE] * len(k))
+    made = (np.concatenate(each) for each in (nodes, edges, radii))
+    return union_sample("pot", *made, 4096, 0.0, seed).points
+
+
+def off_axis(skeleton, side):
+    """Distance of places on a handle's axis outside of the body from the skeleton, in radii."""
+    axis = bow(side)
+    axis = axis[np.abs(axis[:, 0]) > BODY + HANDLE]
+    a, b = skeleton.vertices[skeleton.edges].transpose(1, 0, 2)
+    share = np.linspace(0, 1, 40)[:, None, None]
+    curve = ((1 - share) * a + share * b).reshape(-1, 3)
+    return cKDTree(curve).query(axis)[0] / HANDLE
+
+
+@pytest.mark.parametrize("sides", [(1,), (1, -1)])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_handles_keep_to_their_axes_up_to_the_wall(sides, seed):
+    skeleton = skeletonize(pot(sides, seed=seed))
+    print(skeleton.n_loops, [off_axis(skeleton, s).round(2) for s in sides])
