@@ -13,23 +13,21 @@ from ..numerics.vectors import TINY, Floats, cross, dot, norm, unit
 from ..skeleton import Skeleton
 from .axis_fit import FIT_STAY
 from .diagnostics import STUB_LENGTH
-from .limbs import Line
-from .sections import Sections, VertexPoints, half_axes, measure_sections, normal_moments
-from .wide_ends import half_widths
+from .limbs import AXIS_LENGTH, Line
+from .sections import SURFACE_FIT, Sections, VertexPoints, half_axes, measure_sections, normal_moments
+from .wide_ends import WIDE_NECK, half_widths
 
-HANDLE_THIN = 4.0  # fitted: half width of a body over that of its handle, at least; with 2.5 the scores are the same
-HANDLE_EVEN = 1.5  # fitted: its usual radius, times which a section of a handle is no longer its own
-HANDLE_BACK = 2.0  # fitted: radii behind the last section of its own where the handle is followed from
-HANDLE_STEP = 0.5  # fitted: radii from one section to the next
-HANDLE_FIT = 0.25  # fitted: radii from where it should be at which a tangent plane counts half
-HANDLE_BALL = 1.5  # fitted: half widths from the axis within which points may be the handle's
+HANDLE_EVEN = (
+    1.5  # fitted: its usual size, beyond which a section of a handle is no longer its own, nor a point near it
+)
+HANDLE_STEP = 0.5  # measured: radii from one section to the next; with .3 and .7 the scores are the same
 HANDLE_OPEN = 2 / np.pi  # derived: length of the mean outward normal of half a tube; of more, nothing closes around it
 HANDLE_POINTS = 4  # derived: fewer say nothing of a section
 HANDLE_ROUNDS = 2  # measured: from then on hardly anything moves
 
 
 class Handles:
-    """The handles of a skeleton: parts of loops that leave a body at least four times as wide."""
+    """The handles of a skeleton: parts of loops that leave a body at least three times as wide."""
 
     def __init__(self, skeleton: Skeleton) -> None:
         self.skeleton, self.cloud = skeleton, VertexPoints(skeleton)
@@ -66,7 +64,7 @@ class Handles:
                 branch = np.roll(ring, len(ring) // 2 - int(np.argmax(self._width[ring])))
             wide = self._width[branch]
             top = int(np.argmax(wide))
-            thin = np.flatnonzero((HANDLE_THIN * wide <= wide[top]) & (self.cloud.count[branch] > 0))
+            thin = np.flatnonzero((WIDE_NECK * wide <= wide[top]) & (self.cloud.count[branch] > 0))
             before, after = thin[thin < top], thin[thin > top]
             if not len(before) or not len(after):
                 continue
@@ -98,7 +96,7 @@ class Handles:
         vertices, cloud = self.skeleton.vertices, self.cloud
         around = np.concatenate([path, *others])
         around = around[norm(vertices[around] - vertices[path[0]]) <= self._width[around]]
-        thin = (HANDLE_THIN * self._width[path] <= self._width[around].max(initial=0)) & (cloud.count[path] > 0)
+        thin = (WIDE_NECK * self._width[path] <= self._width[around].max(initial=0)) & (cloud.count[path] > 0)
         run = np.flatnonzero(thin)
         if len(run):  # the first of several
             wide = np.flatnonzero(~thin[run[0] :] & (cloud.count[path[run[0] :]] > 0))
@@ -110,7 +108,7 @@ class Handles:
             return None
         places = vertices[path]
         along = arc_lengths(places)
-        begin = int(np.searchsorted(along, min(along[run[0]] + HANDLE_BACK * radius, along[run].mean())))
+        begin = int(np.searchsorted(along, min(along[run[0]] + AXIS_LENGTH * radius, along[run].mean())))
         behind, ahead = min(begin + 2, len(path) - 1), max(begin - 2, 0)
         centre = self.bodies.get(int(path[0]), places[0])
         half_width, half_thickness = (quantile(half[path[run]]) for half in self._sections[:2])
@@ -140,7 +138,7 @@ class Handles:
         found = [place]
         for _ in range(int(far / (HANDLE_STEP * radius))):
             centre, turned = found[-1] + HANDLE_STEP * radius * way, way
-            near = self._tree.query_ball_point(centre, np.hypot(radius, HANDLE_BALL * half_width))
+            near = self._tree.query_ball_point(centre, np.hypot(radius, HANDLE_EVEN * half_width))
             points, normals = self.cloud.points[near], self.cloud.normals[near]
             for fits in range(HANDLE_ROUNDS + 1):
                 offset = points - centre
@@ -149,8 +147,8 @@ class Handles:
                 height = dot(normals, aside)
                 due = np.sqrt(half_width**2 * side + half_thickness**2 * np.maximum(1 - lean - side, 0))
                 weight = np.maximum(1 - (along / radius) ** 2, 0) * np.maximum(1 - 2 * lean, 0)
-                weight /= 1 + ((np.abs(height) - due) / (HANDLE_FIT * radius)) ** 2
-                weight *= norm(aside) < HANDLE_BALL * half_width
+                weight /= 1 + ((np.abs(height) - due) / (SURFACE_FIT * radius)) ** 2
+                weight *= norm(aside) < HANDLE_EVEN * half_width
                 if fits == HANDLE_ROUNDS or np.count_nonzero(weight) < HANDLE_POINTS:
                     break
                 stay = FIT_STAY * weight.sum() * np.eye(3)

@@ -14,14 +14,13 @@ from .axis_fit import FIT_STAY, axis_box
 from .handles import Handles
 from .limbs import AXIS_LEAVES, AXIS_LENGTH, Limbs, Line
 from .merging import merge_into, with_fields
-from .sections import VertexPoints
+from .sections import SURFACE_FIT, VertexPoints
 
 # All fitted, but for the steps.
 LINE_NOISE = 0.05  # radii that a line is off at its middle, on a straight limb
 LINE_STEP = 0.1  # derived: radii from one place on a limb to the next that is asked
 LINE_STEPS = 400  # derived: places at most
 SURFACE_WEIGHT = 12.0  # of the surface that fits a sphere, over that of a line that says exactly where it is
-SURFACE_FIT = 0.25  # distance from the sphere, over the radius, at which a point counts half
 MEETING_ROUNDS = 10  # precision: from then on hardly anything moves
 
 

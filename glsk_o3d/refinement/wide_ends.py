@@ -13,7 +13,9 @@ from .evidence import SurfaceGraph
 from .merging import with_fields
 from .sections import VertexPoints, measure_sections
 
-WIDE_NECK = 2.0  # fitted: half width of a wide end over that of its neck, at least; with 3 the scores are the same
+# fitted: half width of a wide end over that of its neck, and of a body over that of its handle, at least; with 2 (ends)
+# and 4 (handles) the scores are the same
+WIDE_NECK = 3.0
 
 
 def level_wide_ends(skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:

@@ -38,6 +38,7 @@ def off_axis(skeleton, side):
     return cKDTree(curve).query(axis)[0] / HANDLE
 
 
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
 @pytest.mark.parametrize("sides", [(1,), (1, -1)])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_handles_keep_to_their_axes_up_to_the_wall(sides, seed):
