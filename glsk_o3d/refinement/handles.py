@@ -13,17 +13,14 @@ from ..numerics.vectors import TINY, Floats, cross, dot, norm, unit
 from ..skeleton import Skeleton
 from .axis_fit import FIT_STAY
 from .diagnostics import STUB_LENGTH
-from .limbs import AXIS_LENGTH, Line
+from .limbs import AXIS_LEAVES, AXIS_LENGTH, Line
 from .sections import SURFACE_FIT, Sections, VertexPoints, half_axes, measure_sections, normal_moments
 from .wide_ends import WIDE_NECK, half_widths
 
-HANDLE_EVEN = (
-    1.5  # fitted: its usual size, beyond which a section of a handle is no longer its own, nor a point near it
-)
-HANDLE_STEP = 0.5  # measured: radii from one section to the next; with .3 and .7 the scores are the same
+HANDLE_STEP = 0.5  # precision: radii from one section to the next; with .3 and .7 the scores are the same
 HANDLE_OPEN = 2 / np.pi  # derived: length of the mean outward normal of half a tube; of more, nothing closes around it
 HANDLE_POINTS = 4  # derived: fewer say nothing of a section
-HANDLE_ROUNDS = 2  # measured: from then on hardly anything moves
+HANDLE_ROUNDS = 2  # precision: from then on hardly anything moves
 
 
 class Handles:
@@ -103,7 +100,7 @@ class Handles:
             run = run[run < run[0] + (wide[0] if len(wide) else len(path))]
         radius = quantile(self._sections.radius[path[run]]) if len(run) else 0.0
         size = np.maximum(self._sections.radius, cloud.distance)[path[run]]
-        run = run[size < HANDLE_EVEN * radius]
+        run = run[size < AXIS_LEAVES * radius]
         if len(run) < HANDLE_POINTS or not self._on_loop(path):
             return None
         places = vertices[path]
@@ -138,7 +135,7 @@ class Handles:
         found = [place]
         for _ in range(int(far / (HANDLE_STEP * radius))):
             centre, turned = found[-1] + HANDLE_STEP * radius * way, way
-            near = self._tree.query_ball_point(centre, np.hypot(radius, HANDLE_EVEN * half_width))
+            near = self._tree.query_ball_point(centre, np.hypot(radius, AXIS_LEAVES * half_width))
             points, normals = self.cloud.points[near], self.cloud.normals[near]
             for fits in range(HANDLE_ROUNDS + 1):
                 offset = points - centre
@@ -148,7 +145,7 @@ class Handles:
                 due = np.sqrt(half_width**2 * side + half_thickness**2 * np.maximum(1 - lean - side, 0))
                 weight = np.maximum(1 - (along / radius) ** 2, 0) * np.maximum(1 - 2 * lean, 0)
                 weight /= 1 + ((np.abs(height) - due) / (SURFACE_FIT * radius)) ** 2
-                weight *= norm(aside) < HANDLE_EVEN * half_width
+                weight *= norm(aside) < AXIS_LEAVES * half_width
                 if fits == HANDLE_ROUNDS or np.count_nonzero(weight) < HANDLE_POINTS:
                     break
                 stay = FIT_STAY * weight.sum() * np.eye(3)

@@ -15,7 +15,9 @@ from .axis_fit import FIT_STAY
 from .sections import VertexPoints
 
 # All fitted.
-AXIS_LEAVES = 1.3  # distance from the other limbs, over that from them to the surface, where half a limb is undisturbed
+# distance from the other limbs, over that from them to the surface, where half a limb is undisturbed; and how large a
+# section of a handle is, over the usual one, or how far from its middle a point over the half width, to be its own
+AXIS_LEAVES = 1.3
 AXIS_LENGTH = 2.0  # radii from there, or from where an end is cut, over which its line is taken
 
 

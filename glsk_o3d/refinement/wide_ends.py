@@ -48,8 +48,8 @@ def half_widths(skeleton: Skeleton) -> np.ndarray:
 def _wide_end(path: np.ndarray, vertices: np.ndarray, width: np.ndarray, other: bool) -> np.ndarray:
     """The last vertices of a path, from the neck before its widest place on; none if they are no wide end.
 
-    The widest place is near the leaf. The neck is the narrowest place a half width or more before that, at most half
-    as wide, not much farther from the leaf than the end is wide, and not at an `other` leaf, since rims are narrow,
+    The widest place is near the leaf. The neck is the narrowest place a half width or more before that, at most a
+    third as wide, not much farther from the leaf than the end is wide, and not at an `other` leaf, since rims are narrow,
     too. Where a limb widens, points of one side only may belong to the curve. Behind the neck there are two vertices
     or more.
     """
