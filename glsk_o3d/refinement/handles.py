@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from ..numerics.groups import component_labels, quantile
 from ..numerics.polylines import arc_lengths
-from ..numerics.vectors import TINY, Floats, cross, dot, norm, unit
+from ..numerics.vectors import TINY, Floats, Ints, cross, dot, norm, unit
 from ..skeleton import Skeleton
 from .axis_fit import FIT_STAY
 from .diagnostics import STUB_LENGTH
@@ -46,14 +46,14 @@ class Handles:
         return cKDTree(self.cloud.points)
 
     @cached_property
-    def bodies(self) -> dict[int, Floats]:
-        """Centres of the bodies on which one handle begins and ends, by the vertex nearest to each.
+    def bodies(self) -> Ints:
+        """The vertices nearest to the middles of bodies on which a single handle begins and ends, int array.
 
         On such a body the loop is hardly longer than wide.
         """
-        found: dict[int, Floats] = {}
+        found: list[int] = []
         if not self._any:
-            return found
+            return np.array(found, int)
         vertices, degree = self.skeleton.vertices, self.skeleton.degree
         for branch in self.skeleton.branches:
             if degree[branch[0]] == 2:  # a ring begins anywhere
@@ -70,8 +70,19 @@ class Handles:
             own = self.cloud.members.of(body)
             if apart < STUB_LENGTH * wide[top] and len(own) and self._on_loop(branch):
                 centre = self.cloud.points[own].mean(axis=0)
-                found[int(body[norm(vertices[body] - centre).argmin()])] = centre
-        return found
+                found.append(body[norm(vertices[body] - centre).argmin()])
+        return np.array(found, int)
+
+    def middle(self, paths: list[np.ndarray]) -> Floats:
+        """Mean of the points of the body where some paths begin, (3,) float array; that place, if it has none."""
+        own = self.cloud.members.of(self._around(paths))
+        mean: Floats = self.cloud.points[own].mean(axis=0) if len(own) else self.skeleton.vertices[paths[0][0]]
+        return mean
+
+    def _around(self, paths: list[np.ndarray]) -> Ints:
+        """Vertices of paths whose sections reach the place where all of these begin, int array."""
+        near, vertices = np.unique(np.concatenate(paths)), self.skeleton.vertices
+        return near[norm(vertices[near] - vertices[paths[0][0]]) <= self._width[near]]
 
     def _on_loop(self, path: np.ndarray) -> bool:
         """Whether the ends of a branch, or of a part of one, are connected without it."""
@@ -91,13 +102,12 @@ class Handles:
         if not self._any:
             return None
         vertices, cloud = self.skeleton.vertices, self.cloud
-        around = np.concatenate([path, *others])
-        around = around[norm(vertices[around] - vertices[path[0]]) <= self._width[around]]
-        thin = (WIDE_NECK * self._width[path] <= self._width[around].max(initial=0)) & (cloud.count[path] > 0)
+        wide = self._width[self._around([path, *others])].max(initial=0)
+        thin = (WIDE_NECK * self._width[path] <= wide) & (cloud.count[path] > 0)
         run = np.flatnonzero(thin)
         if len(run):  # the first of several
-            wide = np.flatnonzero(~thin[run[0] :] & (cloud.count[path[run[0] :]] > 0))
-            run = run[run < run[0] + (wide[0] if len(wide) else len(path))]
+            thick = np.flatnonzero(~thin[run[0] :] & (cloud.count[path[run[0] :]] > 0))
+            run = run[run < run[0] + (thick[0] if len(thick) else len(path))]
         radius = quantile(self._sections.radius[path[run]]) if len(run) else 0.0
         size = np.maximum(self._sections.radius, cloud.distance)[path[run]]
         run = run[size < AXIS_LEAVES * radius]
@@ -107,10 +117,9 @@ class Handles:
         along = arc_lengths(places)
         begin = int(np.searchsorted(along, min(along[run[0]] + AXIS_LENGTH * radius, along[run].mean())))
         behind, ahead = min(begin + 2, len(path) - 1), max(begin - 2, 0)
-        centre = self.bodies.get(int(path[0]), places[0])
         half_width, half_thickness = (quantile(half[path[run]]) for half in self._sections[:2])
         found, way = self._followed(
-            float(np.linalg.norm(places[begin] - centre)),
+            float(np.linalg.norm(places[begin] - places[0])),
             places[begin],
             unit(places[[ahead]] - places[[behind]])[0],
             half_width,

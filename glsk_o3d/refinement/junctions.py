@@ -42,8 +42,8 @@ def move_junctions(skeleton: Skeleton) -> Skeleton:
     nearest first, one is made, unless a loop would close.
 
     Handles are followed to the wall of their body, see `Handles`, and go straight on from there to the place nearest to
-    where the junction is. A body on which a single handle begins and ends has no junction: its middle is one for that.
-    The points there belong to the vertex to which they are nearest, less its radius.
+    its middle, where the junction is. A body on which a single handle begins and ends has no junction: the vertex next
+    to its middle is one for that. Points there belong to the vertex to which they are nearest, less its radius.
 
     Returns
     -------
@@ -52,9 +52,9 @@ def move_junctions(skeleton: Skeleton) -> Skeleton:
     """
     while True:
         handles = Handles(skeleton)
-        if not len(skeleton.junctions) and not handles.bodies:
+        if not len(skeleton.junctions) and not len(handles.bodies):
             return skeleton
-        limbs = Limbs(skeleton, np.array([*handles.bodies], int))
+        limbs = Limbs(skeleton, handles.bodies)
         places = _places(skeleton, limbs, handles)
         merged = _merged(skeleton, limbs, places)
         if merged is None:
@@ -79,7 +79,9 @@ def _places(skeleton: Skeleton, limbs: Limbs, handles: Handles) -> dict[int, _Pl
             around.append(path[along <= along[-1] / 2])
         own = cloud.members.of(np.unique(np.concatenate(around)))
         place, touching = meet(lines, skeleton.vertices[junction], radius, cloud.points[own], cloud.normals[own])
-        place = np.clip(handles.bodies.get(junction, place), low, high)  # normals that mean nothing may meet anywhere
+        if junction in handles.bodies or any(len(line.lead) > 1 for line in lines):
+            place = handles.middle([limbs.paths[k] for k in here])
+        place = np.clip(place, low, high)  # normals that mean nothing may meet anywhere
         found[junction] = _Place(place, touching, [_entering(line, place) for line in lines])
     return found
 

@@ -49,9 +49,9 @@ def _wide_end(path: np.ndarray, vertices: np.ndarray, width: np.ndarray, other: 
     """The last vertices of a path, from the neck before its widest place on; none if they are no wide end.
 
     The widest place is near the leaf. The neck is the narrowest place a half width or more before that, at most a
-    third as wide, not much farther from the leaf than the end is wide, and not at an `other` leaf, since rims are narrow,
-    too. Where a limb widens, points of one side only may belong to the curve. Behind the neck there are two vertices
-    or more.
+    third as wide, not much farther from the leaf than the end is wide, and not at an `other` leaf, since rims are
+    narrow, too. Where a limb widens, points of one side only may belong to the curve. Behind the neck there are two
+    vertices or more.
     """
     wide, places = width[path], vertices[path]
     top = int(np.argmax(np.where(norm(places - places[-1]) < STUB_LENGTH * wide, wide, 0)))

@@ -69,5 +69,5 @@ def test_only_a_thick_body_has_handles(thick):
     edges = np.column_stack([np.arange(64), np.roll(np.arange(64), -1)])
     radii = np.interp(np.abs(np.pi - turn), [0, np.pi], [min(thick, 0.15), 0.06])
     skeleton = skeletonize(union_sample("ring", nodes, edges, radii, 4096, 0.0, 0).points)
-    assert not Handles(skeleton).bodies
+    assert not len(Handles(skeleton).bodies)
     assert cKDTree(nodes).query(skeleton.vertices)[0].max() < 0.1
