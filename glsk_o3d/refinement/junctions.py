@@ -42,8 +42,9 @@ def move_junctions(skeleton: Skeleton) -> Skeleton:
     nearest first, one is made, unless a loop would close.
 
     Handles are followed to the wall of their body, see `Handles`, and go straight on from there to the place nearest to
-    its middle, where the junction is. A body on which a single handle begins and ends has no junction: the vertex next
-    to its middle is one for that. Points there belong to the vertex to which they are nearest, less its radius.
+    the junction. If there are two of them, or both ends of one, the junction is in the middle of the body. On a body
+    without a junction the vertex next to its middle is one for that. Points there belong to the vertex to which they
+    are nearest, less its radius.
 
     Returns
     -------
@@ -79,7 +80,7 @@ def _places(skeleton: Skeleton, limbs: Limbs, handles: Handles) -> dict[int, _Pl
             around.append(path[along <= along[-1] / 2])
         own = cloud.members.of(np.unique(np.concatenate(around)))
         place, touching = meet(lines, skeleton.vertices[junction], radius, cloud.points[own], cloud.normals[own])
-        if junction in handles.bodies or any(len(line.lead) > 1 for line in lines):
+        if junction in handles.bodies or sum(len(line.lead) > 1 for line in lines) > 1:
             place = handles.middle([limbs.paths[k] for k in here])
         place = np.clip(place, low, high)  # normals that mean nothing may meet anywhere
         found[junction] = _Place(place, touching, [_entering(line, place) for line in lines])
