@@ -126,7 +126,10 @@ class Handles:
             half_thickness,
             self._sections.across[path[begin]],
         )
-        if len(found) < 2:
+        ahead = self.middle([path, *others]) - found[-1]
+        straight = float(ahead @ way)
+        aside = np.linalg.norm(ahead - straight * way)
+        if len(found) < 2 or aside > wide or not 0 <= straight <= AXIS_LEAVES * wide:  # it does not meet the body there
             return None
         return Line(found[-1], way, radius, 0.0, float(along[begin]), found[::-1], radius)
 
