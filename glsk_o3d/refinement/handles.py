@@ -24,13 +24,14 @@ HANDLE_ROUNDS = 2  # precision: from then on hardly anything moves
 
 
 class Handles:
-    """The handles of a skeleton: parts of loops that leave a body at least three times as wide."""
+    """The handles of a skeleton: thin parts of loops, each next to a body at least three times as wide."""
 
     def __init__(self, skeleton: Skeleton) -> None:
         self.skeleton, self.cloud = skeleton, VertexPoints(skeleton)
 
     @cached_property
-    def _any(self) -> bool:
+    def some(self) -> bool:
+        """Whether there may be any."""
         return self.skeleton.n_loops > 0 and len(self.cloud.points) > 0
 
     @cached_property
@@ -47,12 +48,12 @@ class Handles:
 
     @cached_property
     def bodies(self) -> Ints:
-        """The vertices nearest to the middles of bodies on which a single handle begins and ends, int array.
+        """The vertices nearest to the middles of bodies without a junction, int array.
 
-        On such a body the loop is hardly longer than wide.
+        Such a body is the widest part of a branch, between two thin ones that are near each other.
         """
         found: list[int] = []
-        if not self._any:
+        if not self.some:
             return np.array(found, int)
         vertices, degree = self.skeleton.vertices, self.skeleton.degree
         for branch in self.skeleton.branches:
@@ -68,21 +69,24 @@ class Handles:
             apart = np.linalg.norm(vertices[branch[after[0]]] - vertices[branch[before[-1]]])
             body = branch[before[-1] + 1 : after[0]]
             own = self.cloud.members.of(body)
-            if apart < STUB_LENGTH * wide[top] and len(own) and self._on_loop(branch):
-                centre = self.cloud.points[own].mean(axis=0)
-                found.append(body[norm(vertices[body] - centre).argmin()])
+            if apart > STUB_LENGTH * wide[top] or not len(own):
+                continue
+            away = norm(vertices[body] - self.cloud.points[own].mean(axis=0))
+            if away.min() < wide[top] / 2 and self._on_loop(branch):  # or the middle is that of a thick ring
+                found.append(body[away.argmin()])
         return np.array(found, int)
 
-    def middle(self, paths: list[np.ndarray]) -> Floats:
-        """Mean of the points of the body where some paths begin, (3,) float array; that place, if it has none."""
-        own = self.cloud.members.of(self._around(paths))
-        mean: Floats = self.cloud.points[own].mean(axis=0) if len(own) else self.skeleton.vertices[paths[0][0]]
-        return mean
+    def body(self, paths: list[np.ndarray]) -> tuple[Floats, float]:
+        """The middle of the body where some paths begin, (3,) float array, and its half width.
 
-    def _around(self, paths: list[np.ndarray]) -> Ints:
-        """Vertices of paths whose sections reach the place where all of these begin, int array."""
+        It is there where vertices of these are whose sections reach the beginning; the middle is the mean of its
+        points, or the beginning, if it has none.
+        """
         near, vertices = np.unique(np.concatenate(paths)), self.skeleton.vertices
-        return near[norm(vertices[near] - vertices[paths[0][0]]) <= self._width[near]]
+        near = near[norm(vertices[near] - vertices[paths[0][0]]) <= self._width[near]]
+        own = self.cloud.members.of(near)
+        middle = self.cloud.points[own].mean(axis=0) if len(own) else vertices[paths[0][0]]
+        return middle, float(self._width[near].max(initial=0))
 
     def _on_loop(self, path: np.ndarray) -> bool:
         """Whether the ends of a branch, or of a part of one, are connected without it."""
@@ -96,13 +100,12 @@ class Handles:
     def follow(self, path: np.ndarray, others: list[np.ndarray]) -> Line | None:
         """Follow a limb from where it is undisturbed to the body where its path begins; None if it is no handle there.
 
-        The body is as wide there as the widest place of it or of `others`, the paths that begin there, too, whose
-        section reaches the beginning.
+        The `others` are the paths that begin there, too.
         """
-        if not self._any:
+        if not self.some:
             return None
         vertices, cloud = self.skeleton.vertices, self.cloud
-        wide = self._width[self._around([path, *others])].max(initial=0)
+        middle, wide = self.body([path, *others])
         thin = (WIDE_NECK * self._width[path] <= wide) & (cloud.count[path] > 0)
         run = np.flatnonzero(thin)
         if len(run):  # the first of several
@@ -115,7 +118,9 @@ class Handles:
             return None
         places = vertices[path]
         along = arc_lengths(places)
-        begin = int(np.searchsorted(along, min(along[run[0]] + AXIS_LENGTH * radius, along[run].mean())))
+        # the other half may be followed from its own end
+        most = min(along[run[0]] + AXIS_LENGTH * radius, along[run].mean(), along[-1] / 2)
+        begin = int(np.searchsorted(along, most, "right")) - 1
         behind, ahead = min(begin + 2, len(path) - 1), max(begin - 2, 0)
         half_width, half_thickness = (quantile(half[path[run]]) for half in self._sections[:2])
         found, way = self._followed(
@@ -126,9 +131,9 @@ class Handles:
             half_thickness,
             self._sections.across[path[begin]],
         )
-        ahead = self.middle([path, *others]) - found[-1]
-        straight = float(ahead @ way)
-        aside = np.linalg.norm(ahead - straight * way)
+        inwards = middle - found[-1]
+        straight = float(inwards @ way)
+        aside = np.linalg.norm(inwards - straight * way)
         if len(found) < 2 or aside > wide or not 0 <= straight <= AXIS_LEAVES * wide:  # it does not meet the body there
             return None
         return Line(found[-1], way, radius, 0.0, float(along[begin]), found[::-1], radius)

@@ -42,9 +42,9 @@ def move_junctions(skeleton: Skeleton) -> Skeleton:
     nearest first, one is made, unless a loop would close.
 
     Handles are followed to the wall of their body, see `Handles`, and go straight on from there to the place nearest to
-    the junction. If there are two of them, or both ends of one, the junction is in the middle of the body. On a body
-    without a junction the vertex next to its middle is one for that. Points there belong to the vertex to which they
-    are nearest, less its radius.
+    the junction. If two of them, or both ends of one, meet more than half the body's half width from the mean of its
+    points, that is the junction's place. In a body without a junction, the vertex nearest to its middle takes that
+    part. Points there belong to the vertex to which they are nearest, less its radius.
 
     Returns
     -------
@@ -52,18 +52,20 @@ def move_junctions(skeleton: Skeleton) -> Skeleton:
         With other places of the junctions and of the vertices beside them, perhaps fewer.
     """
     while True:
-        handles = Handles(skeleton)
-        if not len(skeleton.junctions) and not len(handles.bodies):
-            return skeleton
-        limbs = Limbs(skeleton, handles.bodies)
-        places = _places(skeleton, limbs, handles)
+        limbs = Limbs(skeleton)
+        places = _places(skeleton, limbs)
         merged = _merged(skeleton, limbs, places)
         if merged is None:
-            return _straightened(skeleton, limbs, places)
+            break
         skeleton = merged
+    handles = Handles(skeleton)
+    if handles.some:
+        limbs = Limbs(skeleton, handles.bodies)
+        places = _places(skeleton, limbs, handles)
+    return _straightened(skeleton, limbs, places)
 
 
-def _places(skeleton: Skeleton, limbs: Limbs, handles: Handles) -> dict[int, _Place]:
+def _places(skeleton: Skeleton, limbs: Limbs, handles: Handles | None = None) -> dict[int, _Place]:
     """Where every junction belongs."""
     cloud = VertexPoints(skeleton)
     low, high = axis_box(cloud.points if len(cloud.points) else skeleton.vertices)
@@ -74,14 +76,19 @@ def _places(skeleton: Skeleton, limbs: Limbs, handles: Handles) -> dict[int, _Pl
             path, along = limbs.paths[limb], arc_lengths(limbs.vertices[limbs.paths[limb]])
             others = [limbs.paths[k] for k in here if limbs.branch[k] != limbs.branch[limb]]
             radius_of = limbs.radius[limbs.branch[limb]]
-            line = handles.follow(path, others) or limb_line(limbs.vertices, limbs.surface, path, radius_of, others)
+            line = handles.follow(path, others) if handles else None
+            line = line or limb_line(limbs.vertices, limbs.surface, path, radius_of, others)
             lines.append(line)
             radius = max(radius, float(np.interp(line.start, along, limbs.surface[path])))
             around.append(path[along <= along[-1] / 2])
+        followed = sum(len(line.lead) > 1 for line in lines)
+        if len(lines) == 2 and followed < 2:  # no junction, but in a body of which a handle is not known
+            continue
         own = cloud.members.of(np.unique(np.concatenate(around)))
         place, touching = meet(lines, skeleton.vertices[junction], radius, cloud.points[own], cloud.normals[own])
-        if junction in handles.bodies or sum(len(line.lead) > 1 for line in lines) > 1:
-            place = handles.middle([limbs.paths[k] for k in here])
+        if handles and followed > 1:  # their lines pass each other
+            middle, wide = handles.body([limbs.paths[k] for k in here])
+            place = place if len(lines) > 2 and np.linalg.norm(place - middle) < wide / 2 else middle
         place = np.clip(place, low, high)  # normals that mean nothing may meet anywhere
         found[junction] = _Place(place, touching, [_entering(line, place) for line in lines])
     return found
