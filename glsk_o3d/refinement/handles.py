@@ -143,9 +143,9 @@ class Handles:
     ) -> tuple[Floats, Floats]:
         """Follow a handle from a place, at most so far, while its sections close around it.
 
-        Returned are the centres of the sections, (k, 3) float array, that place first, and the direction of the last.
-        It is that of which the normals around have the least share, and the centre is nearest to the planes that they
-        span with it, as in `fit_axis`. A point counts by how nearly its tangent plane touches an ellipse with the half
+        Returned are the centres of the sections, (k, 3) float array, that place first, and the direction of the last
+        two steps. A section stands across the direction of which the normals around have the least share, and its
+        centre is nearest to the planes that they span with it, as in `fit_axis`. A point counts by how nearly its tangent plane touches an ellipse with the half
         axes of the handle, so that the wall of the body hardly does.
         """
         radius = max(np.sqrt(half_width * half_thickness), TINY)
@@ -181,4 +181,5 @@ class Handles:
                 break
             found.append(centre)
             way = turned
-        return np.array(found), way
+        # half a ring hardly says where it leads: the last places do
+        return np.array(found), unit((found[-1] - found[max(len(found) - 3, 0)])[None])[0]

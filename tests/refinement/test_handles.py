@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from glsk_o3d import skeletonize
+from glsk_o3d import refiner, skeletonize
 from glsk_o3d.refinement.handles import Handles
+from glsk_o3d.refinement.limbs import Limbs
 from glsk_o3d.samples.capsules import union_sample
 
 BODY, HANDLE, REACH = 0.4, 0.06, 0.28
@@ -61,13 +62,61 @@ def test_a_handle_goes_through_the_middle_of_its_body():
     assert inside[skeleton.vertex_of_point[of_body]].mean() > 0.99
 
 
-@pytest.mark.parametrize("thick", [0.06, 0.3])
-def test_only_a_thick_body_has_handles(thick):
-    """A ring of which one side is no, or hardly, thicker than the other is a ring."""
-    turn = np.linspace(0, 2 * np.pi, 64, endpoint=False)
+def ring(radii, beads=(), seed=0):
+    """Points of a ring of radius 1, as thick as this at 64 places, with balls on it: pairs of an angle and a radius."""
+    turn = np.append(np.linspace(0, 2 * np.pi, 64, endpoint=False), [angle for angle, _ in beads])
     nodes = np.column_stack([np.cos(turn), np.sin(turn), 0 * turn])
     edges = np.column_stack([np.arange(64), np.roll(np.arange(64), -1)])
-    radii = np.interp(np.abs(np.pi - turn), [0, np.pi], [min(thick, 0.15), 0.06])
-    skeleton = skeletonize(union_sample("ring", nodes, edges, radii, 4096, 0.0, 0).points)
+    radii = np.append(np.broadcast_to(radii, 64), [radius for _, radius in beads])
+    return union_sample("ring", nodes, edges, radii, 4096, 0.0, seed).points
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+@pytest.mark.parametrize(("radius", "bodies"), [(0.1, 0), (0.4, 1)])
+def test_only_a_thick_body_has_handles(radius, bodies):
+    """A bead on a ring of thickness .06."""
+    skeleton = skeletonize(ring(0.06, [(0, radius)]))
+    assert skeleton.n_loops == 1
+    assert len(Handles(skeleton).bodies) == bodies
+    assert np.abs(np.linalg.norm(skeleton.vertices, axis=1) - 1).max() < 0.15
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_thick_ring_with_a_thin_clasp_is_no_body(seed):
+    """The middle of its points is in the hole."""
+    turn = np.abs(np.linspace(-np.pi, np.pi, 64, endpoint=False))
+    skeleton = skeletonize(ring(np.interp(turn, [0.4, 0.8, np.pi], [0.05, 0.22, 0.28]), seed=seed))
+    assert skeleton.n_loops == 1
     assert not len(Handles(skeleton).bodies)
-    assert cKDTree(nodes).query(skeleton.vertices)[0].max() < 0.1
+    assert np.abs(np.linalg.norm(skeleton.vertices, axis=1) - 1).max() < 0.15
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+def test_handles_are_followed_to_the_wall_and_from_either_end(monkeypatch):
+    given = []
+    monkeypatch.setattr(refiner, "move_junctions", lambda skeleton: given.append(skeleton) or skeleton)
+    points = ring(0.06, [(0, 0.4)])
+    skeletonize(points)
+    (skeleton,) = given
+    size = np.ptp(points) / np.ptp(skeleton.points)
+    handles = Handles(skeleton)
+    (middle,) = handles.bodies
+    limbs = Limbs(skeleton, handles.bodies)
+    lines = [handles.follow(limbs.paths[limb], []) for limb in limbs.at[int(middle)]]
+    assert len(lines) == 2
+    assert sum(line.start for line in lines) < skeleton.edge_lengths.sum()
+    for line in lines:
+        inwards = [1, 0, 0] - line.lead[0] * size
+        assert abs(np.linalg.norm(inwards) - 0.4) < 0.09
+        assert line.way @ inwards > 0.9 * np.linalg.norm(inwards)
+
+
+def test_junctions_are_in_the_middle_of_balls():
+    """Of a frame of thin bars between balls, all of which are handles of these."""
+    corner = np.array(list(np.ndindex(2, 2, 2)), float)
+    edges = np.array([(i, j) for i in range(8) for j in range(i) if np.abs(corner[i] - corner[j]).sum() == 1])
+    nodes, radii = np.concatenate([corner, corner]), np.repeat([0.05, 0.2], 8)
+    skeleton = skeletonize(union_sample("frame", nodes, edges, radii, 8000, 0.0, 0).points)
+    assert (len(skeleton.junctions), skeleton.n_loops) == (8, 5)
+    assert cKDTree(corner).query(skeleton.vertices[skeleton.junctions])[0].max() < 0.06
