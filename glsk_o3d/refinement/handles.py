@@ -145,8 +145,8 @@ class Handles:
 
         Returned are the centres of the sections, (k, 3) float array, that place first, and the direction of the last
         two steps. A section stands across the direction of which the normals around have the least share, and its
-        centre is nearest to the planes that they span with it, as in `fit_axis`. A point counts by how nearly its tangent plane touches an ellipse with the half
-        axes of the handle, so that the wall of the body hardly does.
+        centre is nearest to the planes that they span with it, as in `fit_axis`. A point counts by how nearly its
+        tangent plane touches an ellipse with the half axes of the handle, so that the wall of the body hardly does.
         """
         radius = max(np.sqrt(half_width * half_thickness), TINY)
         found = [place]
