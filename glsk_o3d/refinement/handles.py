@@ -36,7 +36,7 @@ class Handles:
 
     @cached_property
     def _width(self) -> Floats:
-        return half_widths(self.skeleton)
+        return half_widths(self.cloud, self._sections)
 
     @cached_property
     def _sections(self) -> Sections:
@@ -53,8 +53,6 @@ class Handles:
         Such a body is the widest part of a branch, between two thin ones that are near each other.
         """
         found: list[int] = []
-        if not self.some:
-            return np.array(found, int)
         vertices, degree = self.skeleton.vertices, self.skeleton.degree
         for branch in self.skeleton.branches:
             if degree[branch[0]] == 2:  # a ring begins anywhere
@@ -102,8 +100,6 @@ class Handles:
 
         The `others` are the paths that begin there, too.
         """
-        if not self.some:
-            return None
         vertices, cloud = self.skeleton.vertices, self.cloud
         middle, wide = self.body([path, *others])
         thin = (WIDE_NECK * self._width[path] <= wide) & (cloud.count[path] > 0)

@@ -51,6 +51,8 @@ def move_junctions(skeleton: Skeleton) -> Skeleton:
     Skeleton
         With other places of the junctions and of the vertices beside them, perhaps fewer.
     """
+    if not len(skeleton.junctions) and not skeleton.n_loops:
+        return skeleton
     while True:
         limbs = Limbs(skeleton)
         places = _places(skeleton, limbs)

@@ -11,7 +11,7 @@ from ..skeleton import Skeleton
 from .diagnostics import MAJORITY, STUB_LENGTH
 from .evidence import SurfaceGraph
 from .merging import with_fields
-from .sections import VertexPoints, measure_sections
+from .sections import Sections, VertexPoints, measure_sections
 
 # fitted: half width of a wide end over that of its neck, and of a body over that of its handle, at least; with 2 (ends)
 # and 4 (handles) the scores are the same
@@ -25,7 +25,7 @@ def level_wide_ends(skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
     is the way ahead told by the limb, which meets a pan at an angle. The bands know the way from the neck to the rim,
     and their means hardly depend on the points. Balls on a neck are wide ends, too.
     """
-    width = half_widths(skeleton)
+    width = half_widths(VertexPoints(skeleton), measure_sections(skeleton))
     leaf = skeleton.degree == 1
     for branch in skeleton.branches:
         for path in (branch, branch[::-1]):
@@ -34,13 +34,13 @@ def level_wide_ends(skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
     return skeleton
 
 
-def half_widths(skeleton: Skeleton) -> np.ndarray:
+def half_widths(cloud: VertexPoints, sections: Sections) -> np.ndarray:
     """Half width of the section at every vertex, or the distance to its points or those beside it, (M,) float array.
 
     Where normals mean nothing, as on scan lines, points are farther away than the half width.
     """
-    away, (a, b) = VertexPoints(skeleton).distance, skeleton.edges.T
-    width = np.fmax(measure_sections(skeleton).half_width, away)
+    away, (a, b) = cloud.distance, cloud.skeleton.edges.T
+    width = np.fmax(sections.half_width, away)
     np.maximum.at(width, np.concatenate([a, b]), away[np.concatenate([b, a])])
     return width
 
