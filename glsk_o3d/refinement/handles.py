@@ -19,6 +19,7 @@ from .wide_ends import WIDE_NECK, half_widths
 
 HANDLE_STEP = 0.5  # precision: radii from one section to the next; with .3 and .7 the scores are the same
 HANDLE_OPEN = 2 / np.pi  # derived: length of the mean outward normal of half a tube; of more, nothing closes around it
+FLAT_BODY = 1e-6  # precision: of a body's squared half width, so that a flat one has a wall
 HANDLE_POINTS = 4  # derived: fewer say nothing of a section
 HANDLE_ROUNDS = 2  # precision: from then on hardly anything moves
 
@@ -74,17 +75,19 @@ class Handles:
                 found.append(body[away.argmin()])
         return np.array(found, int)
 
-    def body(self, paths: list[np.ndarray]) -> tuple[Floats, float]:
-        """The middle of the body where some paths begin, (3,) float array, and its half width.
+    def body(self, paths: list[np.ndarray]) -> tuple[Floats, float, Floats]:
+        """The body where some paths begin: the mean of its points, its half width, and the ellipsoid of its wall.
 
-        It is there where vertices of these are whose sections reach the beginning; the middle is the mean of its
-        points, or the beginning, if it has none.
+        It is there where vertices of these are that are less than their width away from the beginning. The ellipsoid
+        has the covariance of the points, (3, 3) float array E; on that of a sphere, :math:`x^T E^{-1} x = 1`.
         """
         near, vertices = np.unique(np.concatenate(paths)), self.skeleton.vertices
-        near = near[norm(vertices[near] - vertices[paths[0][0]]) <= self._width[near]]
-        own = self.cloud.members.of(near)
-        middle = self.cloud.points[own].mean(axis=0) if len(own) else vertices[paths[0][0]]
-        return middle, float(self._width[near].max(initial=0))
+        near = near[norm(vertices[near] - vertices[paths[0][0]]) <= 2 * self._width[near]]
+        own, wide = self.cloud.members.of(near), float(self._width[near].max(initial=0))
+        points = self.cloud.points[own] if len(own) else vertices[paths[0][:1]]
+        middle = points.mean(axis=0)
+        flattest = FLAT_BODY * wide**2 * np.eye(3)
+        return middle, wide, 3 * (points - middle).T @ (points - middle) / len(points) + flattest
 
     def _on_loop(self, path: np.ndarray) -> bool:
         """Whether the ends of a branch, or of a part of one, are connected without it."""
@@ -98,10 +101,11 @@ class Handles:
     def follow(self, path: np.ndarray, others: list[np.ndarray]) -> Line | None:
         """Follow a limb from where it is undisturbed to the body where its path begins; None if it is no handle there.
 
-        The `others` are the paths that begin there, too.
+        The `others` are the paths that begin there, too. If it does not come to the wall, it is followed from farther
+        away.
         """
-        vertices, cloud = self.skeleton.vertices, self.cloud
-        middle, wide = self.body([path, *others])
+        places, cloud = self.skeleton.vertices[path], self.cloud
+        middle, wide, wall = self.body([path, *others])
         thin = (WIDE_NECK * self._width[path] <= wide) & (cloud.count[path] > 0)
         run = np.flatnonzero(thin)
         if len(run):  # the first of several
@@ -112,27 +116,30 @@ class Handles:
         run = run[size < AXIS_LEAVES * radius]
         if len(run) < HANDLE_POINTS or not self._on_loop(path):
             return None
-        places = vertices[path]
         along = arc_lengths(places)
-        # the other half may be followed from its own end
-        most = min(along[run[0]] + AXIS_LENGTH * radius, along[run].mean(), along[-1] / 2)
-        begin = int(np.searchsorted(along, most, "right")) - 1
-        behind, ahead = min(begin + 2, len(path) - 1), max(begin - 2, 0)
         half_width, half_thickness = (quantile(half[path[run]]) for half in self._sections[:2])
-        found, way = self._followed(
-            float(np.linalg.norm(places[begin] - places[0])),
-            places[begin],
-            unit(places[[ahead]] - places[[behind]])[0],
-            half_width,
-            half_thickness,
-            self._sections.across[path[begin]],
-        )
-        inwards = middle - found[-1]
-        straight = float(inwards @ way)
-        aside = np.linalg.norm(inwards - straight * way)
-        if len(found) < 2 or aside > wide or not 0 <= straight <= AXIS_LEAVES * wide:  # it does not meet the body there
-            return None
-        return Line(found[-1], way, radius, 0.0, float(along[begin]), found[::-1], radius)
+        start, last = along[run[0]], along[run].mean()  # the rest is followed from its own end
+        last = last if path[0] == path[-1] else min(last, along[-1] / 2)
+        while start < last:
+            start = min(start + AXIS_LENGTH * radius, last)
+            begin = int(np.searchsorted(along, start, "right")) - 1
+            behind, ahead = min(begin + 2, len(path) - 1), max(begin - 2, 0)
+            found, way = self._followed(
+                float(np.linalg.norm(places[begin] - places[0])),
+                places[begin],
+                unit(places[[ahead]] - places[[behind]])[0],
+                half_width,
+                half_thickness,
+                self._sections.across[path[begin]],
+            )
+            inwards = middle - found[-1]
+            if len(found) > 1 and inwards @ np.linalg.solve(wall, inwards) < AXIS_LEAVES**2:
+                # the wall disturbs what the handle says of its direction: the more it turns aside, the less that counts
+                straight = max(inwards @ way, 0.0)
+                share = straight**2 / max(inwards @ inwards, TINY)
+                way = unit(((1 - share) * inwards + share * straight * way)[None])[0]
+                return Line(found[-1], way, radius, 0.0, float(along[begin]), found[::-1], radius)
+        return None
 
     def _followed(
         self, far: float, place: Floats, way: Floats, half_width: float, half_thickness: float, across: Floats

@@ -89,7 +89,7 @@ def _places(skeleton: Skeleton, limbs: Limbs, handles: Handles | None = None) ->
         own = cloud.members.of(np.unique(np.concatenate(around)))
         place, touching = meet(lines, skeleton.vertices[junction], radius, cloud.points[own], cloud.normals[own])
         if handles and followed > 1:  # their lines pass each other
-            middle, wide = handles.body([limbs.paths[k] for k in here])
+            middle, wide, _ = handles.body([limbs.paths[k] for k in here])
             place = place if len(lines) > 2 and np.linalg.norm(place - middle) < wide / 2 else middle
         place = np.clip(place, low, high)  # normals that mean nothing may meet anywhere
         found[junction] = _Place(place, touching, [_entering(line, place) for line in lines])
@@ -147,6 +147,8 @@ def _straightened(skeleton: Skeleton, limbs: Limbs, places: dict[int, _Place]) -
             lead = np.concatenate([[place], lead])
             lengths = arc_lengths(lead)
             there = along[moved] / max(start, TINY) * lengths[-1]
+            for corner in lengths[1:-1][:2] if len(moved) else ():  # where it turns, foot and wall, is a vertex
+                there[np.abs(there - corner).argmin()] = corner
             vertices[path[moved]] = place_at(lead, lengths, there)
             # a junction owns points of everything around: what it measured itself does not count
             radius = np.interp(start, along, skeleton.radii[path])

@@ -62,6 +62,38 @@ def test_a_handle_goes_through_the_middle_of_its_body():
     assert inside[skeleton.vertex_of_point[of_body]].mean() > 0.99
 
 
+def cup(seed, lid):
+    """Points of a cylinder, without the top or with it, and half a torus that meets its wall at right angles."""
+    random = np.random.default_rng(seed)
+    turn, high = random.uniform(-np.pi, np.pi, 40000), random.uniform(-0.5, 0.5, 40000)
+    wall = np.column_stack([BODY * np.cos(turn), BODY * np.sin(turn), high])
+    flat = np.column_stack([random.uniform(-BODY, BODY, (40000, 2)), np.full(40000, -0.5)])
+    flat = flat[np.hypot(*flat[:, :2].T) < BODY][: int(40000 * BODY / 2)]
+    flats = [flat, -flat] if lid else [flat]
+    around, along = random.uniform(-np.pi, np.pi, 40000), random.uniform(-np.pi / 2, np.pi / 2, 40000)
+    out = 0.3 + HANDLE * np.cos(around)
+    handle = np.column_stack([0.38 + out * np.cos(along), HANDLE * np.sin(around), out * np.sin(along)])
+    handle = handle[random.uniform(0, 0.3 + HANDLE, 40000) < out][: int(40000 * 0.3 * np.pi * HANDLE / BODY)]
+    points = np.concatenate([wall, *flats, handle[np.hypot(*handle[:, :2].T) > BODY]])
+    return points[random.permutation(len(points))[:4096]]
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+@pytest.mark.parametrize("lid", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_the_curve_of_a_cup_leaves_its_body_in_the_handle_only(seed, lid):
+    skeleton = skeletonize(cup(seed, lid))
+    assert (skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)) == (1, 1, 0)
+    a, b = skeleton.vertices[skeleton.edges].transpose(1, 0, 2)
+    share = np.linspace(0, 1, 40)[:, None, None]
+    x, y, z = ((1 - share) * a + share * b).reshape(-1, 3).T
+    assert np.abs(z).max() < 0.5
+    outside = np.hypot(x, y) > BODY
+    off = np.hypot(np.hypot(x - 0.38, z) - 0.3, y)[outside] / HANDLE
+    assert off.max() < 0.8
+    assert off.mean() < 0.2
+
+
 def ring(radii, beads=(), seed=0):
     """Points of a ring of radius 1, as thick as this at 64 places, with balls on it: pairs of an angle and a radius."""
     turn = np.append(np.linspace(0, 2 * np.pi, 64, endpoint=False), [angle for angle, _ in beads])
