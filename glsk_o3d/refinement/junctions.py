@@ -139,7 +139,7 @@ def _straightened(skeleton: Skeleton, limbs: Limbs, places: dict[int, _Place]) -
             along = arc_lengths(skeleton.vertices[path])
             start, lead = line.start, line.lead
             # the place lies ahead of where the limb is joined: it would turn back
-            if (lead[-1] - place) @ line.way > 0:
+            if len(lead) == 1 and (lead[0] - place) @ line.way > 0:
                 ahead = np.flatnonzero((along > start) & ((skeleton.vertices[path] - place) @ line.way < 0))
                 if len(ahead):
                     start, lead = along[ahead[0]], skeleton.vertices[path[ahead[:1]]]

@@ -152,3 +152,15 @@ def test_junctions_are_in_the_middle_of_balls():
     skeleton = skeletonize(union_sample("frame", nodes, edges, radii, 8000, 0.0, 0).points)
     assert (len(skeleton.junctions), skeleton.n_loops) == (8, 5)
     assert cKDTree(corner).query(skeleton.vertices[skeleton.junctions])[0].max() < 0.06
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+def test_a_handle_keeps_to_its_axis_whatever_is_said_of_its_direction_in_the_wall(monkeypatch):
+    follow = Handles.follow
+
+    def turned(self, path, others):
+        line = follow(self, path, others)
+        return line and line._replace(way=-line.way)
+
+    monkeypatch.setattr(Handles, "follow", turned)
+    assert off_axis(skeletonize(pot([1])), 1).max() < 0.5
