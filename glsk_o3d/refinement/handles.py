@@ -19,8 +19,9 @@ from .wide_ends import WIDE_NECK, half_widths
 
 HANDLE_STEP = 0.5  # precision: radii from one section to the next; with .3 and .7 the scores are the same
 HANDLE_OPEN = 2 / np.pi  # derived: length of the mean outward normal of half a tube; of more, nothing closes around it
-FLAT_BODY = 1e-6  # precision: of a body's squared half width, so that a flat one has a wall
+FLAT_BODY = 1e-6  # precision: of a body's squared half width, so that its ellipsoid can be inverted if it is flat
 HANDLE_POINTS = 4  # derived: fewer say nothing of a section
+HANDLE_TRIES = 4  # speed: places, each two radii farther away, from which a handle is followed until it meets the wall
 HANDLE_ROUNDS = 2  # precision: from then on hardly anything moves
 
 
@@ -56,9 +57,10 @@ class Handles:
         found: list[int] = []
         vertices, degree = self.skeleton.vertices, self.skeleton.degree
         for branch in self.skeleton.branches:
-            if degree[branch[0]] == 2:  # a ring begins anywhere
+            if degree[branch[0]] == 2:  # a ring begins anywhere, but not in a body
                 ring = branch[:-1]
-                branch = np.roll(ring, len(ring) // 2 - int(np.argmax(self._width[ring])))
+                thinnest = int(np.argmin(np.where(self.cloud.count[ring] > 0, self._width[ring], np.inf)))
+                branch = np.append(np.roll(ring, -thinnest), ring[thinnest])
             wide = self._width[branch]
             top = int(np.argmax(wide))
             thin = np.flatnonzero((WIDE_NECK * wide <= wide[top]) & (self.cloud.count[branch] > 0))
@@ -78,16 +80,20 @@ class Handles:
     def body(self, paths: list[np.ndarray]) -> tuple[Floats, float, Floats]:
         """The body where some paths begin: the mean of its points, its half width, and the ellipsoid of its wall.
 
-        It is there where vertices of these are that are less than their width away from the beginning. The ellipsoid
-        has the covariance of the points, (3, 3) float array E; on that of a sphere, :math:`x^T E^{-1} x = 1`.
+        It is as far along these as all vertices are at most their width away from the beginning. The ellipsoid has the
+        covariance of the points, (3, 3) float array E; on that of a sphere, :math:`x^T E^{-1} x = 1`. Without points,
+        the beginning is the mean.
         """
-        near, vertices = np.unique(np.concatenate(paths)), self.skeleton.vertices
-        near = near[norm(vertices[near] - vertices[paths[0][0]]) <= 2 * self._width[near]]
+        vertices, parts = self.skeleton.vertices, []
+        for path in [*paths, *(path[::-1] for path in paths if path[0] == path[-1])]:
+            inside = norm(vertices[path] - vertices[path[0]]) <= 2 * self._width[path]
+            parts.append(path[np.logical_and.accumulate(inside)])
+        near = np.unique(np.concatenate(parts))
         own, wide = self.cloud.members.of(near), float(self._width[near].max(initial=0))
         points = self.cloud.points[own] if len(own) else vertices[paths[0][:1]]
         middle = points.mean(axis=0)
-        flattest = FLAT_BODY * wide**2 * np.eye(3)
-        return middle, wide, 3 * (points - middle).T @ (points - middle) / len(points) + flattest
+        covariance = (points - middle).T @ (points - middle) / len(points)
+        return middle, wide, 3 * covariance + FLAT_BODY * wide**2 * np.eye(3)
 
     def _on_loop(self, path: np.ndarray) -> bool:
         """Whether the ends of a branch, or of a part of one, are connected without it."""
@@ -118,10 +124,10 @@ class Handles:
             return None
         along = arc_lengths(places)
         half_width, half_thickness = (quantile(half[path[run]]) for half in self._sections[:2])
-        start, last = along[run[0]], along[run].mean()  # the rest is followed from its own end
-        last = last if path[0] == path[-1] else min(last, along[-1] / 2)
-        while start < last:
-            start = min(start + AXIS_LENGTH * radius, last)
+        # the rest is followed from its own end, if that is one of the same body's; else it may be no handle there
+        last = along[run].mean() if path[0] == path[-1] else min(along[run].mean(), along[-1] / 2)
+        away = along[run[0]] + AXIS_LENGTH * radius * np.arange(1, HANDLE_TRIES + 1)
+        for start in np.unique(np.minimum(away, last)):
             begin = int(np.searchsorted(along, start, "right")) - 1
             behind, ahead = min(begin + 2, len(path) - 1), max(begin - 2, 0)
             found, way = self._followed(

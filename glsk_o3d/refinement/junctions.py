@@ -147,8 +147,8 @@ def _straightened(skeleton: Skeleton, limbs: Limbs, places: dict[int, _Place]) -
             lead = np.concatenate([[place], lead])
             lengths = arc_lengths(lead)
             there = along[moved] / max(start, TINY) * lengths[-1]
-            for corner in lengths[1:-1][:2] if len(moved) else ():  # where it turns, foot and wall, is a vertex
-                there[np.abs(there - corner).argmin()] = corner
+            if len(lead) > 2 and len(moved):  # the wall is a corner
+                there[np.abs(there - lengths[2]).argmin()] = lengths[2]
             vertices[path[moved]] = place_at(lead, lengths, there)
             # a junction owns points of everything around: what it measured itself does not count
             radius = np.interp(start, along, skeleton.radii[path])

@@ -1,5 +1,7 @@
 """Handles: their curves keep to their axes up to the wall of the body, and go straight on to its middle."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -18,26 +20,36 @@ def bow(side=1):
     return np.column_stack([side * (0.38 + REACH * np.cos(TURN)), 0 * TURN, REACH * np.sin(TURN)])
 
 
+def joined(*parts, n=4096, seed=0):
+    """Points of parts, each an axis and a radius."""
+    nodes, edges, radii = [], [], []
+    for axis, radius in parts:
+        k = sum(map(len, nodes)) + np.arange(len(axis))
+        nodes.append(axis)
+        edges.append(np.column_stack([k[:-1], k[1:]]))
+        radii.append(np.full(len(k), radius))
+    made = (np.concatenate(each) for each in (nodes, edges, radii))
+    return union_sample("parts", *made, n, 0.0, seed).points
+
+
 def pot(sides, seed=0):
     """Points of a body with handles on some sides, and no other ends."""
-    nodes, edges, radii = [np.array([[0, 0, -0.35], [0, 0, 0.35]])], [np.array([[0, 1]])], [[BODY, BODY]]
-    for side in sides:
-        k = sum(map(len, nodes)) + np.arange(len(TURN))
-        nodes.append(bow(side))
-        edges.append(np.column_stack([k[:-1], k[1:]]))
-        radii.append([HANDLE] * len(k))
-    made = (np.concatenate(each) for each in (nodes, edges, radii))
-    return union_sample("pot", *made, 4096, 0.0, seed).points
+    body = np.array([[0, 0, -0.35], [0, 0, 0.35]])
+    return joined((body, BODY), *((bow(side), HANDLE) for side in sides), seed=seed)
+
+
+def curve_of(skeleton):
+    """Places all along the edges."""
+    a, b = skeleton.vertices[skeleton.edges].transpose(1, 0, 2)
+    share = np.linspace(0, 1, 40)[:, None, None]
+    return ((1 - share) * a + share * b).reshape(-1, 3)
 
 
 def off_axis(skeleton, side):
     """Distance of places on a handle's axis outside of the body from the skeleton, in radii."""
     axis = bow(side)
     axis = axis[np.abs(axis[:, 0]) > BODY + HANDLE]
-    a, b = skeleton.vertices[skeleton.edges].transpose(1, 0, 2)
-    share = np.linspace(0, 1, 40)[:, None, None]
-    curve = ((1 - share) * a + share * b).reshape(-1, 3)
-    return cKDTree(curve).query(axis)[0] / HANDLE
+    return cKDTree(curve_of(skeleton)).query(axis)[0] / HANDLE
 
 
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
@@ -47,6 +59,7 @@ def test_handles_keep_to_their_axes_up_to_the_wall(sides, seed):
     skeleton = skeletonize(pot(sides, seed=seed))
     assert (skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)) == (1, len(sides), 0)
     assert max(off_axis(skeleton, side).max() for side in sides) < 0.5
+    assert skeleton.edge_lengths.min() > 0.05 * HANDLE  # no vertex is where another one is
 
 
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
@@ -84,14 +97,41 @@ def cup(seed, lid):
 def test_the_curve_of_a_cup_leaves_its_body_in_the_handle_only(seed, lid):
     skeleton = skeletonize(cup(seed, lid))
     assert (skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)) == (1, 1, 0)
-    a, b = skeleton.vertices[skeleton.edges].transpose(1, 0, 2)
-    share = np.linspace(0, 1, 40)[:, None, None]
-    x, y, z = ((1 - share) * a + share * b).reshape(-1, 3).T
+    x, y, z = curve_of(skeleton).T
     assert np.abs(z).max() < 0.5
     outside = np.hypot(x, y) > BODY
     off = np.hypot(np.hypot(x - 0.38, z) - 0.3, y)[outside] / HANDLE
     assert off.max() < 0.8
     assert off.mean() < 0.2
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+@pytest.mark.parametrize("seed", range(4))
+def test_a_bail_is_followed_until_it_meets_a_long_body(seed):
+    """The walls of a basket that lies are twice as far away as it is wide, and its bail leaves along them."""
+    body = np.array([[-0.3, 0, 0], [0.3, 0, 0]])
+    turn = np.linspace(0, np.pi, 25)
+    bail = np.column_stack([0.6 * np.cos(turn), 0 * turn, 0.2 + 0.8 * np.sin(turn)])
+    skeleton = skeletonize(joined((body, BODY), (bail, 0.05), seed=seed))
+    assert skeleton.n_loops == 1
+    curve = curve_of(skeleton)
+    from_body = np.linalg.norm(curve - np.clip(curve, body[0], body[1]), axis=1)
+    assert np.minimum(from_body / BODY, cKDTree(bail).query(curve)[0] / 0.08).max() < 1
+    assert skeleton.edge_lengths.min() > 0.05 * HANDLE
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+@pytest.mark.parametrize("apart", [1.1, 1.3])
+def test_a_body_has_its_own_middle_beside_a_larger_one(apart):
+    along = np.linspace(0, 1, 17)
+    ball = np.array([[0, 0, -0.01], [0, 0, 0.01]])
+    bows = [
+        np.column_stack([apart * along, side * np.sin(np.pi * along) ** 0.7, 0 * along]) for side in (0.75, 0, -0.75)
+    ]
+    points = joined((ball, 0.25), (ball + [apart, 0, 0], 0.6), *((bow, 0.05) for bow in bows), n=8000)
+    skeleton = skeletonize(points)
+    assert skeleton.n_loops == 2
+    assert np.linalg.norm(skeleton.vertices, axis=1).min() < 0.06
 
 
 def ring(radii, beads=(), seed=0):
@@ -124,24 +164,41 @@ def test_a_thick_ring_with_a_thin_clasp_is_no_body(seed):
     assert np.abs(np.linalg.norm(skeleton.vertices, axis=1) - 1).max() < 0.15
 
 
-@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
-def test_handles_are_followed_to_the_wall_and_from_either_end(monkeypatch):
+def bead(monkeypatch):
+    """A skeleton of a ring with a bead, as the junctions are moved from, its middle, and the size of the ring in it."""
     given = []
     monkeypatch.setattr(refiner, "move_junctions", lambda skeleton: given.append(skeleton) or skeleton)
     points = ring(0.06, [(0, 0.4)])
     skeletonize(points)
     (skeleton,) = given
-    size = np.ptp(points) / np.ptp(skeleton.points)
-    handles = Handles(skeleton)
-    (middle,) = handles.bodies
-    limbs = Limbs(skeleton, handles.bodies)
-    lines = [handles.follow(limbs.paths[limb], []) for limb in limbs.at[int(middle)]]
+    (middle,) = Handles(skeleton).bodies
+    return skeleton, int(middle), np.ptp(points) / np.ptp(skeleton.points)
+
+
+def followed(skeleton, middle):
+    """The lines from the middle of a body."""
+    limbs = Limbs(skeleton, np.array([middle]))
+    return [Handles(skeleton).follow(limbs.paths[limb], []) for limb in limbs.at[middle]]
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+def test_handles_are_followed_to_the_wall_and_from_either_end(monkeypatch):
+    skeleton, middle, size = bead(monkeypatch)
+    lines = followed(skeleton, middle)
     assert len(lines) == 2
     assert sum(line.start for line in lines) < skeleton.edge_lengths.sum()
     for line in lines:
         inwards = [1, 0, 0] - line.lead[0] * size
         assert abs(np.linalg.norm(inwards) - 0.4) < 0.09
         assert line.way @ inwards > 0.9 * np.linalg.norm(inwards)
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+def test_a_handle_that_breaks_off_before_the_wall_is_not_followed(monkeypatch):
+    skeleton, middle, size = bead(monkeypatch)
+    away = np.linalg.norm(skeleton.points * size - [1, 0, 0], axis=1)
+    seen = np.where((away > 0.45) & (away < 0.9), -1, skeleton.vertex_of_point)
+    assert followed(replace(skeleton, vertex_of_point=seen), middle) == [None, None]
 
 
 def test_junctions_are_in_the_middle_of_balls():
