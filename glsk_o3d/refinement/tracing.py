@@ -11,10 +11,11 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
+from ..numerics.cycles import minimum_cycle_basis
 from ..numerics.groups import component_labels, group_median
 from ..numerics.near_links import LINK_SPACINGS, join_pieces, linked, slice_centres, steps
 from ..numerics.polylines import incident_edges, nearest_on_edges, places_on_edges
-from ..numerics.vectors import dot, norm, unit
+from ..numerics.vectors import TINY, dot, norm, unit
 from ..skeleton import NOT_MEASURED, Skeleton
 from .merging import merge_into
 from .rooted import numbered_from, root_among
@@ -38,13 +39,14 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
     distance, and have the spread of their points for a radius, and confidence 0; their points have no normals any more.
     Of a tree, vertex 0 is the root, and the first vertex of an edge is nearer to it.
 
-    See `without_surface` for `surface`, 0 for no traced parts, and `Tracer.root` for the root.
+    See `without_surface` for `surface`, 0 for no traced parts, and `Tracer.root` for the root. Without one, nothing
+    is traced if most of what would be is on loops.
     """
     cloud, m = SpacedPoints(skeleton), len(skeleton.vertices)
     thin = np.zeros(m, bool)
     if surface and m:
         thin = without_surface(cloud, surface)
-    if m == 0 or (root is None and not thin.any()):
+    if m == 0 or (root is None and (not thin.any() or _mostly_on_loops(skeleton, thin))):
         return skeleton
     mixed, joined = _Mixed.of(skeleton, cloud, thin).joined(anywhere=root is not None)
     ends = skeleton.leaves[~thin[skeleton.leaves]]
@@ -66,6 +68,13 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
         traced = numbered_from(traced, int(np.searchsorted(stays, paths.index[roots[0]])))
         report = replace(report, root=tuple(traced.vertices[0].tolist()))
     return replace(traced, normals=np.where(loose[:, None], np.nan, skeleton.normals), report=report)
+
+
+def _mostly_on_loops(skeleton: Skeleton, thin: np.ndarray) -> bool:
+    """Whether most of some vertices are on loops, as in a frame of thin bars: from its root, paths would open all."""
+    loops = minimum_cycle_basis(len(thin), skeleton.edges, np.maximum(skeleton.edge_lengths, TINY))
+    on_loops = np.unique(np.concatenate(loops)) if loops else np.empty(0, int)
+    return bool(2 * thin[on_loops].sum() > thin.sum())
 
 
 @dataclass(frozen=True, eq=False)

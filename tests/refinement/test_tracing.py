@@ -8,6 +8,7 @@ import pytest
 import glsk_o3d as glsk
 from glsk_o3d import InvalidParameterError, Tracer, pipelines, samples
 from glsk_o3d.analysis import branch_table
+from glsk_o3d.samples.capsules import union_sample
 
 RNG = np.random.default_rng(3)
 ROOT, FORK = np.zeros(3), np.array([0, 0, 1.0])
@@ -125,6 +126,17 @@ def test_a_ring_of_points_stays_a_loop():
     assert abs(ring.length - 2 * np.pi) < 0.1
     tree = pipelines.tree("x")(ring.points)
     assert (tree.n_components, tree.n_loops, len(tree.leaves)) == (1, 0, 2)
+
+
+def test_a_frame_of_thin_bars_keeps_its_loops():
+    """Of which some show no surface: paths from one root would open them."""
+    corner = np.array(list(np.ndindex(3, 3, 3)), float)
+    edges = np.array([(i, j) for i in range(27) for j in range(i) if np.abs(corner[i] - corner[j]).sum() == 1])
+    nodes, radii = np.concatenate([corner, corner]), np.repeat([0.05, 0.2], 27)
+    frame = glsk.skeletonize(union_sample("frame", nodes, edges, radii, 4000, 0.0, 0).points)
+    assert (frame.n_components, frame.n_loops, len(frame.leaves), len(frame.junctions)) == (1, 28, 0, 27)
+    tree = pipelines.tree("z")(frame.points)
+    assert (tree.n_components, tree.n_loops) == (1, 0)
 
 
 def test_a_trunk_with_a_surface_stays_what_it_was():
