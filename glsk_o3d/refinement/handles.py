@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -23,6 +24,14 @@ FLAT_BODY = 1e-6  # precision: of a body's squared half width, so that its ellip
 HANDLE_POINTS = 4  # derived: fewer say nothing of a section
 HANDLE_TRIES = 4  # speed: places, each two radii farther away, from which a handle is followed until it meets the wall
 HANDLE_ROUNDS = 2  # precision: from then on hardly anything moves
+
+
+class Body(NamedTuple):
+    """What handles begin at."""
+
+    middle: Floats  # (3,), the mean of its points
+    half_width: float
+    wall: Floats  # (3, 3), of the ellipsoid with their covariance: on that of a sphere, x^T wall^{-1} x = 1
 
 
 class Handles:
@@ -77,12 +86,10 @@ class Handles:
                 found.append(body[away.argmin()])
         return np.array(found, int)
 
-    def body(self, paths: list[np.ndarray]) -> tuple[Floats, float, Floats]:
-        """The body where some paths begin: the mean of its points, its half width, and the ellipsoid of its wall.
+    def body(self, paths: list[np.ndarray]) -> Body:
+        """The body where some paths begin: as far along these as all vertices are at most their width away from there.
 
-        It is as far along these as all vertices are at most their width away from the beginning. The ellipsoid has the
-        covariance of the points, (3, 3) float array E; on that of a sphere, :math:`x^T E^{-1} x = 1`. Without points,
-        the beginning is the mean.
+        Without points, its middle is the beginning.
         """
         vertices, parts = self.skeleton.vertices, []
         for path in [*paths, *(path[::-1] for path in paths if path[0] == path[-1])]:
@@ -91,9 +98,9 @@ class Handles:
         near = np.unique(np.concatenate(parts))
         own, wide = self.cloud.members.of(near), float(self._width[near].max(initial=0))
         points = self.cloud.points[own] if len(own) else vertices[paths[0][:1]]
-        middle = points.mean(axis=0)
-        covariance = (points - middle).T @ (points - middle) / len(points)
-        return middle, wide, 3 * covariance + FLAT_BODY * wide**2 * np.eye(3)
+        offset = points - points.mean(axis=0)
+        wall = 3 * offset.T @ offset / len(points) + FLAT_BODY * wide**2 * np.eye(3)
+        return Body(points.mean(axis=0), wide, wall)
 
     def _on_loop(self, path: np.ndarray) -> bool:
         """Whether the ends of a branch, or of a part of one, are connected without it."""
@@ -104,15 +111,13 @@ class Handles:
         label = component_labels(len(self.skeleton.vertices), edges[~gone])
         return bool(label[path[0]] == label[path[-1]])
 
-    def follow(self, path: np.ndarray, others: list[np.ndarray]) -> Line | None:
+    def follow(self, path: np.ndarray, body: Body) -> Line | None:
         """Follow a limb from where it is undisturbed to the body where its path begins; None if it is no handle there.
 
-        The `others` are the paths that begin there, too. If it does not come to the wall, it is followed from farther
-        away.
+        If it does not come to the wall, it is followed from farther away.
         """
         places, cloud = self.skeleton.vertices[path], self.cloud
-        middle, wide, wall = self.body([path, *others])
-        thin = (WIDE_NECK * self._width[path] <= wide) & (cloud.count[path] > 0)
+        thin = (WIDE_NECK * self._width[path] <= body.half_width) & (cloud.count[path] > 0)
         run = np.flatnonzero(thin)
         if len(run):  # the first of several
             thick = np.flatnonzero(~thin[run[0] :] & (cloud.count[path[run[0] :]] > 0))
@@ -138,8 +143,8 @@ class Handles:
                 half_thickness,
                 self._sections.across[path[begin]],
             )
-            inwards = middle - found[-1]
-            if len(found) > 1 and inwards @ np.linalg.solve(wall, inwards) < AXIS_LEAVES**2:
+            inwards = body.middle - found[-1]
+            if len(found) > 1 and inwards @ np.linalg.solve(body.wall, inwards) < AXIS_LEAVES**2:
                 # the wall disturbs what the handle says of its direction: the more it turns aside, the less that counts
                 straight = max(inwards @ way, 0.0)
                 share = straight**2 / max(inwards @ inwards, TINY)

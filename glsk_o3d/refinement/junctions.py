@@ -74,11 +74,12 @@ def _places(skeleton: Skeleton, limbs: Limbs, handles: Handles | None = None) ->
     found = {}
     for junction in sorted(limbs.at):
         here, lines, radius, around = limbs.at[junction], [], 0.0, []
+        body = handles.body([limbs.paths[limb] for limb in here]) if handles else None
         for limb in here:
             path, along = limbs.paths[limb], arc_lengths(limbs.vertices[limbs.paths[limb]])
             others = [limbs.paths[k] for k in here if limbs.branch[k] != limbs.branch[limb]]
             radius_of = limbs.radius[limbs.branch[limb]]
-            line = handles.follow(path, others) if handles else None
+            line = handles.follow(path, body) if handles and body else None
             line = line or limb_line(limbs.vertices, limbs.surface, path, radius_of, others)
             lines.append(line)
             radius = max(radius, float(np.interp(line.start, along, limbs.surface[path])))
@@ -88,9 +89,9 @@ def _places(skeleton: Skeleton, limbs: Limbs, handles: Handles | None = None) ->
             continue
         own = cloud.members.of(np.unique(np.concatenate(around)))
         place, touching = meet(lines, skeleton.vertices[junction], radius, cloud.points[own], cloud.normals[own])
-        if handles and followed > 1:  # their lines pass each other
-            middle, wide, _ = handles.body([limbs.paths[k] for k in here])
-            place = place if len(lines) > 2 and np.linalg.norm(place - middle) < wide / 2 else middle
+        if body and followed > 1:  # their lines pass each other
+            near = np.linalg.norm(place - body.middle) < body.half_width / 2
+            place = place if len(lines) > 2 and near else body.middle
         place = np.clip(place, low, high)  # normals that mean nothing may meet anywhere
         found[junction] = _Place(place, touching, [_entering(line, place) for line in lines])
     return found

@@ -177,8 +177,9 @@ def bead(monkeypatch):
 
 def followed(skeleton, middle):
     """The lines from the middle of a body."""
-    limbs = Limbs(skeleton, np.array([middle]))
-    return [Handles(skeleton).follow(limbs.paths[limb], []) for limb in limbs.at[middle]]
+    limbs, handles = Limbs(skeleton, np.array([middle])), Handles(skeleton)
+    paths = [limbs.paths[limb] for limb in limbs.at[middle]]
+    return [handles.follow(path, handles.body(paths)) for path in paths]
 
 
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
@@ -215,8 +216,8 @@ def test_junctions_are_in_the_middle_of_balls():
 def test_a_handle_keeps_to_its_axis_whatever_is_said_of_its_direction_in_the_wall(monkeypatch):
     follow = Handles.follow
 
-    def turned(self, path, others):
-        line = follow(self, path, others)
+    def turned(self, path, body):
+        line = follow(self, path, body)
         return line and line._replace(way=-line.way)
 
     monkeypatch.setattr(Handles, "follow", turned)
