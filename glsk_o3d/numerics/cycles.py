@@ -26,6 +26,15 @@ def minimum_cycle_basis(n: int, edges: np.ndarray, lengths: np.ndarray) -> list[
     return [np.array(vertices) for _, vertices in sorted(cycles, key=lambda cycle: cycle[0])]
 
 
+def edges_on_cycles(n: int, edges: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Whether each edge is on a cycle, (e,) bool array, and no bridge; all as in `minimum_cycle_basis`."""
+    cycles = minimum_cycle_basis(n, edges, lengths)
+    pairs = [np.column_stack([cycle, np.roll(cycle, -1)]) for cycle in cycles]
+    low, high = np.sort(np.concatenate([np.empty((0, 2), int), *pairs]), axis=1).T
+    first, second = np.sort(edges, axis=1).T
+    return np.isin(first * n + second, low * n + high)
+
+
 def _cyclic_chains(n: int, edges: np.ndarray, lengths: np.ndarray) -> list[Chain]:
     """Paths between junctions of the cyclic part. A ring of its own starts anywhere."""
     while True:

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..numerics.groups import component_labels, quantile
+from ..numerics.cycles import edges_on_cycles
+from ..numerics.groups import quantile
 from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import TINY, Floats, Ints, cross, dot, norm, unit
 from ..skeleton import Skeleton
@@ -102,14 +103,16 @@ class Handles:
         wall = 3 * offset.T @ offset / len(points) + FLAT_BODY * wide**2 * np.eye(3)
         return Body(points.mean(axis=0), wide, wall)
 
-    def _on_loop(self, path: np.ndarray) -> bool:
-        """Whether the ends of a branch, or of a part of one, are connected without it."""
-        if path[0] == path[-1]:
-            return True
+    @cached_property
+    def _looped(self) -> set[tuple[int, int]]:
+        """The edges of loops, in both directions."""
         edges = self.skeleton.edges
-        gone = np.isin(edges, path[1:-1]).any(axis=1) if len(path) > 2 else np.isin(edges, path).all(axis=1)
-        label = component_labels(len(self.skeleton.vertices), edges[~gone])
-        return bool(label[path[0]] == label[path[-1]])
+        looped = edges_on_cycles(len(self._width), edges, np.maximum(self.skeleton.edge_lengths, TINY))
+        return {(a, b) for i, j in edges[looped].tolist() for a, b in ((i, j), (j, i))}
+
+    def _on_loop(self, path: np.ndarray) -> bool:
+        """Whether a branch, or a part of one, is on a loop: with its first edge, all are."""
+        return tuple(path[:2].tolist()) in self._looped
 
     def follow(self, path: np.ndarray, body: Body) -> Line | None:
         """Follow a limb from where it is undisturbed to the body where its path begins; None if it is no handle there.

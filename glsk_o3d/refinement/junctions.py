@@ -69,7 +69,7 @@ def move_junctions(skeleton: Skeleton) -> Skeleton:
 
 def _places(skeleton: Skeleton, limbs: Limbs, handles: Handles | None = None) -> dict[int, _Place]:
     """Where every junction belongs."""
-    cloud = VertexPoints(skeleton)
+    cloud = handles.cloud if handles else VertexPoints(skeleton)
     low, high = axis_box(cloud.points if len(cloud.points) else skeleton.vertices)
     found = {}
     for junction in sorted(limbs.at):

@@ -11,7 +11,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
-from ..numerics.cycles import minimum_cycle_basis
+from ..numerics.cycles import edges_on_cycles
 from ..numerics.groups import component_labels, group_median
 from ..numerics.near_links import LINK_SPACINGS, join_pieces, linked, slice_centres, steps
 from ..numerics.polylines import incident_edges, nearest_on_edges, places_on_edges
@@ -72,9 +72,9 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
 
 def _mostly_on_loops(skeleton: Skeleton, thin: np.ndarray) -> bool:
     """Whether most of some vertices are on loops, as in a frame of thin bars: from its root, paths would open all."""
-    loops = minimum_cycle_basis(len(thin), skeleton.edges, np.maximum(skeleton.edge_lengths, TINY))
-    on_loops = np.unique(np.concatenate(loops)) if loops else np.empty(0, int)
-    return bool(2 * thin[on_loops].sum() > thin.sum())
+    edges = skeleton.edges
+    looped = edges_on_cycles(len(thin), edges, np.maximum(skeleton.edge_lengths, TINY))
+    return bool(2 * thin[np.unique(edges[looped])].sum() > thin.sum())
 
 
 @dataclass(frozen=True, eq=False)

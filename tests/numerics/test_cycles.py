@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glsk_o3d.numerics.cycles import inscribed_circle, minimum_cycle_basis
+from glsk_o3d.numerics.cycles import edges_on_cycles, inscribed_circle, minimum_cycle_basis
 
 
 def basis_of(graph):
@@ -82,3 +82,11 @@ def test_curves_without_an_inside():
     line = np.outer([0, 1, 2, 3, 2, 1], [1.0, 2, 3])
     # the distance is the root of a difference of squares, which rounding leaves, on some processors, of their size
     assert inscribed_circle(line)[1] < np.sqrt(np.finfo(float).eps) * np.linalg.norm(np.ptp(line, axis=0))
+
+
+def test_bridges_and_twigs_are_on_no_cycle():
+    """Two triangles, joined by an edge, one with a twig."""
+    edges = np.array([[0, 1], [1, 2], [0, 2], [2, 3], [3, 4], [4, 5], [5, 3], [0, 6]])
+    np.testing.assert_array_equal(edges_on_cycles(7, edges, np.ones(8)), [1, 1, 1, 0, 1, 1, 1, 0])
+    assert not edges_on_cycles(3, edges[:2], np.ones(2)).any()
+    assert len(edges_on_cycles(3, edges[:0], np.ones(0))) == 0
