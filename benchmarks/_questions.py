@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 from _clouds import Case
@@ -16,6 +17,7 @@ from glsk_o3d import Pipeline, Refiner
 from glsk_o3d.analysis import Truth
 from glsk_o3d.analysis.comparison import TIP_REACH
 from glsk_o3d.numerics.cycles import minimum_cycle_basis
+from glsk_o3d.numerics.vectors import norm
 from glsk_o3d.refinement.air import branch_facts
 from glsk_o3d.refinement.bridging import gap_facts
 from glsk_o3d.refinement.evidence import Evidence, in_order
@@ -28,6 +30,8 @@ STEP = 0.3  # between places on the true axis, in median radii
 CANDIDATES = 32  # nearest places, of which the one counts whose ball is nearest: thin parts grow out of thick ones
 NEAR = 4  # edges on either side of the weakest place of a branch in which it may cross air
 AIR_WAY, AIR_RADII = 2.0, 3.0  # across air is what is so many times farther along the axis, and so many radii more
+BENT_WAY = 1.2  # times farther along the axis than straight on is another way, perhaps
+NEXT_TO_NOTHING = 1e-3  # what it costs to go along the axis inside
 SAME_WAY, SAME_RADII = 1.5, 2.0  # and with a gap in one part the axis goes on no farther round than that
 
 
@@ -102,7 +106,8 @@ class Placed:
         graph = coo_array((lengths, links.T), shape=(len(points), len(points))).tocsr()
         starts, self._row = np.unique(self.place, return_inverse=True)
         self._way, self._before = dijkstra(graph, directed=False, indices=starts, return_predecessors=True)
-        self._points, self._radii = points, radii
+        self._points, self._radii, self._vertices = points, radii, vertices
+        self._links, self._lengths = links, lengths
 
     def apart(self, i: np.ndarray, j: np.ndarray) -> np.ndarray:
         """Whether there is air between vertices i and j: along the axis it is much farther, bool array."""
@@ -122,17 +127,38 @@ class Placed:
 
         A loop that crosses air is none.
         """
-        if self.apart(cycle, np.roll(cycle, -1)).any():
+        if not np.isfinite(self._along(cycle, np.roll(cycle, -1))).all():
             return False
         flow: dict[tuple[int, int], int] = {}
         for a, b in zip(cycle.tolist(), np.roll(cycle, -1).tolist(), strict=True):
-            start, here = int(self.place[a]), int(self.place[b])
-            while here != start:
-                before = int(self._before[self._row[a], here])
-                link, way = ((before, here), 1) if before < here else ((here, before), -1)
-                flow[link] = flow.get(link, 0) + way
-                here = before
+            way = self._walk(a, b)
+            thickness, across = self._radii[way].max(), float(self._across(a, b))
+            if self._length(way) > AIR_WAY * across + AIR_RADII * thickness:
+                return False
+            for here, there in pairwise(way):
+                link, to = ((here, there), 1) if here < there else ((there, here), -1)
+                flow[link] = flow.get(link, 0) + to
         return any(flow.values())
+
+    def _walk(self, a: int, b: int) -> list[int]:
+        """Places on the axis from that of one vertex to that of its neighbour.
+
+        They are on the shortest way, but where that is longer than the straight one, on that in whose balls the middle
+        between the vertices is: from one foot of a handle to the other through the body, and not along the handle.
+        """
+        start, stop, before = int(self.place[a]), int(self.place[b]), self._before[self._row[a]]
+        if self._along(a, b) > BENT_WAY * self._across(a, b):
+            outside = norm((self._vertices[a] + self._vertices[b]) / 2 - self._points) - self._radii
+            cost = np.maximum(outside, 0)[self._links].mean(axis=1) + NEXT_TO_NOTHING * self._radii.min()
+            graph = coo_array((self._lengths * cost, self._links.T), shape=(len(self._points),) * 2).tocsr()
+            before = dijkstra(graph, directed=False, indices=start, return_predecessors=True)[1]
+        way = [stop]
+        while way[-1] != start:
+            way.append(int(before[way[-1]]))
+        return way[::-1]
+
+    def _length(self, way: list[int]) -> float:
+        return float(norm(np.diff(self._points[way], axis=0)).sum())
 
     def _along(self, i, j):
         return self._way[self._row[i], self.place[j]]

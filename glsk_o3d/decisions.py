@@ -37,7 +37,7 @@ QUESTIONS = {
         "loop closed",
         "handle",
         False,
-        dict(constant=-4.3, opening=2.6, sight=1.4, fall=2.7, bonds=1.0),
+        dict(constant=-1.5, opening=2.2, passage=4.4, bonds=2.5),
     ),
     "limb": Question(
         "the branch at ({}) is a limb",

@@ -132,6 +132,20 @@ def inscribed_circle(points: np.ndarray) -> tuple[np.ndarray, float]:
     return centre @ axes + middle, best
 
 
+def places_inside(points: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Places in the plane of a closed polygon (m, 3) and inside of it, (g, 3), on a grid of n x n; the plane's axes.
+
+    The rows of the axes (3, 3) are unit vectors, the last one the normal.
+    """
+    middle = points.mean(axis=0)
+    axes = np.linalg.svd(points - middle, full_matrices=False)[2]
+    polygon = (points - middle) @ axes.T
+    low, high = polygon[:, :2].min(axis=0), polygon[:, :2].max(axis=0)
+    x, y = (low + (np.arange(n)[:, None] + 0.5) / n * (high - low)).T
+    grid = np.stack([*np.meshgrid(x, y), np.zeros((n, n))], axis=-1).reshape(-1, 3)
+    return grid[_inside(grid, polygon, np.roll(polygon, -1, axis=0))] @ axes + middle, axes
+
+
 def _distance(points: np.ndarray, polygon: np.ndarray, after: np.ndarray) -> np.ndarray:
     """Distance from each point to the closed polygon, (n,) float array; edges lead to the places `after` its own."""
     edge = after - polygon

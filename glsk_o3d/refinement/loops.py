@@ -3,10 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.distance import cdist
+from scipy.spatial import cKDTree
 
 from ..decisions import QUESTIONS, Decision
-from ..numerics.cycles import inscribed_circle, minimum_cycle_basis
+from ..numerics.cycles import inscribed_circle, minimum_cycle_basis, places_inside
 from ..numerics.groups import component_labels
 from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import TINY
@@ -15,10 +15,11 @@ from .evidence import LEAST_INSIDE, Evidence
 from .merging import collapse_triangles, drop_edges, merge_vertices
 from .sections import VertexPoints
 
-WIDE_LOOP = 1.5  # fitted: opening of a loop that is more than two strands in one part
-WIDE_OPEN = 3.0  # fitted: opening, and sight in spacings, beyond which they say no more: crowns have wide false loops
-RINGS = [(k / 4, np.arange(6 * k) * np.pi / (3 * k)) for k in range(1, 5)]  # derived: evenly spaced places in a circle
-VIEWS = np.vstack([[0, 0], *(r * np.column_stack([np.cos(a), np.sin(a)]) for r, a in RINGS)])
+WIDE_LOOP = 1.4  # fitted: surface distances, the radius of a loop that is more than two strands in one part
+WIDE_OPEN = 6.0  # fitted: spacings, its radius beyond which that says no more: crowns have wide false loops
+CLEAR_SIGHT = 3.0  # fitted: and that of what one sees through it
+LOOP_GRID = 15  # precision: of a grid across a loop, either way
+WALL_SECTORS = 16  # precision: directions around a place in which walls are looked for
 
 
 def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Decision]]:
@@ -37,7 +38,7 @@ def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
             (decisions if false else kept).append(Decision("loop", where, loop.probability, false))
             if not false:
                 continue
-            if loop.facts["opening"] < np.log(WIDE_LOOP):
+            if loop.is_narrow:
                 narrow.append(cycle)
             elif used.isdisjoint(cycle.tolist()):  # two cuts in what two loops share would tear a piece out of it
                 cut.append(sorted((cycle[loop.weakest], cycle[(loop.weakest + 1) % len(cycle)])))
@@ -57,6 +58,7 @@ class LoopEvidence(NamedTuple):
 
     facts: dict[str, float]
     inside: float  # median winding number along it
+    is_narrow: bool  # two strands in one part
     centre: np.ndarray  # of its hole
     weakest: int  # position of the edge, from there to the next vertex, that the fewest bonds cross
 
@@ -69,52 +71,75 @@ class LoopEvidence(NamedTuple):
 def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> list[LoopEvidence]:
     """What speaks for and against that each of some loops is a handle.
 
-    The facts are: how wide it opens, the radius of the largest circle inside it over the distance of the surface, as a
-    logarithm; how well one sees through it, the radius in spacings of the points of the widest empty cylinder that
-    stands on a place in that circle, as long either way as both together; the share by which the winding number falls
-    from the median along the loop to that place, since a handle is one if no disc that spans it stays inside; and the
-    least bonds that cross it somewhere, over their median, as a logarithm.
+    The facts are logarithms: of the radius of the largest circle inside it, in spacings of the points; of how wide the
+    passage through it is, below; and of the least bonds that cross it somewhere, over their median.
+
+    A loop is a handle if no disc that spans it stays inside. So the passage is at the place in its plane where the
+    radius of the widest empty cylinder across it, as long either way as the circle and the distance of the surface
+    together, times the share by which the winding number falls from the median along the loop, is largest. There it is
+    that radius, in spacings, times the share or, where that is less, how far the points around face the place: not
+    those around a hole in the data.
     """
     if not cycles:
         return []
     surface = VertexPoints(skeleton).distance
     tubes = [max(float(np.median(surface[cycle])), TINY) for cycle in cycles]
-    bonds = evidence.bonds(skeleton)
+    bonds, spacing = evidence.bonds(skeleton), max(evidence.spacing, TINY)
     loops = [skeleton.vertices[cycle] for cycle in cycles]
-    views = [_view(loop, tube, evidence) for loop, tube in zip(loops, tubes, strict=True)]
-    winding = evidence.winding(np.concatenate([[view.place for view in views], *loops]))
-    there, *along = np.split(winding, np.cumsum([len(cycles), *map(len, cycles[:-1])]))
+    views = [_View(loop, tube, evidence) for loop, tube in zip(loops, tubes, strict=True)]
+    asked = [*(view.places for view in views), *loops]
+    winding = np.split(evidence.winding(np.concatenate(asked)), np.cumsum([len(each) for each in asked[:-1]]))
     found = []
-    for cycle, tube, view, outside, inside in zip(cycles, tubes, views, there, map(np.median, along), strict=True):
+    for cycle, tube, view, there, along in zip(cycles, tubes, views, winding, winding[len(cycles) :], strict=False):
         crossing = crossings(positions(cycle, len(surface)), len(cycle), bonds, closed=True)
+        inside = float(np.median(along))
+        fall = np.clip(1 - there / max(inside, LEAST_INSIDE), 0, 1)
+        best = int(np.argmax(view.sight * fall))
+        passage = min(view.sight[best] / spacing, CLEAR_SIGHT) * min(fall[best], view.walls(best))
         facts = dict(
-            opening=float(np.log(min(view.radius, WIDE_OPEN * tube) / tube + 0.1)),
-            sight=min(view.sight, WIDE_OPEN),
-            fall=float(1 - outside / max(inside, LEAST_INSIDE)),
-            bonds=float(np.log(crossing.min() / max(np.median(crossing), TINY) + 0.01)),
+            opening=float(np.log(min(view.radius / spacing, WIDE_OPEN) + 0.5)),
+            passage=float(np.log(passage + 0.3)),
+            bonds=float(np.log(crossing.min() / max(np.median(crossing), TINY) + 0.1)),
         )
-        found.append(LoopEvidence(facts, float(inside), view.centre, int(np.argmin(crossing))))
+        narrow = view.radius < WIDE_LOOP * tube
+        found.append(LoopEvidence(facts, inside, narrow, view.centre, int(np.argmin(crossing))))
     return found
 
 
-class _View(NamedTuple):
-    """Through a loop."""
+class _View:
+    """Through a loop, along the normal of its plane.
 
-    centre: np.ndarray  # of the largest circle in it
-    radius: float
-    place: np.ndarray  # in that circle, where one sees best
-    sight: float  # radius of the widest empty cylinder across it there, in spacings of the points
+    Attributes
+    ----------
+    centre, radius
+        Of the largest circle in the loop.
+    places : (g, 3) float array
+        On a grid in its plane, inside of it.
+    sight : (g,) float array
+        Radius of the widest cylinder without points that stands on each.
+    """
 
+    def __init__(self, loop: np.ndarray, tube: float, evidence: Evidence) -> None:
+        self.centre, self.radius = inscribed_circle(loop)
+        self.places, axes = places_inside(loop, LOOP_GRID)
+        if not len(self.places):
+            self.places = self.centre[None]
+        points = (evidence.points - self.centre) @ axes.T
+        near = np.abs(points[:, 2]) < self.radius + tube
+        self._points, self._normals = points[near, :2], evidence.normals[near] @ axes[:2].T
+        self._places = (self.places - self.centre) @ axes[:2].T
+        free = np.full(len(self.places), self.radius)
+        self.sight = cKDTree(self._points).query(self._places)[0] if near.any() else free
 
-def _view(loop: np.ndarray, tube: float, evidence: Evidence) -> _View:
-    centre, radius = inscribed_circle(loop)
-    axes = np.linalg.svd(loop - loop.mean(axis=0), full_matrices=False)[2]
-    aside = radius + WIDE_OPEN * evidence.spacing
-    points = (evidence.points - centre) @ axes.T
-    points = points[(np.abs(points) < [aside, aside, radius + tube]).all(axis=1)]
-    sight = cdist(radius * VIEWS, points[:, :2]).min(axis=1, initial=np.inf) / max(evidence.spacing, TINY)
-    best = np.argmax(sight)
-    return _View(centre, radius, centre + radius * VIEWS[best] @ axes[:2], float(sight[best]))
+    def walls(self, place: int) -> float:
+        """How far the nearest points all around a place face it: the mean cosine, of no points 0."""
+        way = self._points - self._places[place]
+        distance = np.hypot(*way.T)
+        sector = (WALL_SECTORS * (np.arctan2(way[:, 1], way[:, 0]) / (2 * np.pi) + 0.5)).astype(int) % WALL_SECTORS
+        order = np.lexsort([distance, sector])
+        nearest = order[np.unique(sector[order], return_index=True)[1]]
+        cosine = np.abs((self._normals[nearest] * way[nearest]).sum(axis=1)) / np.maximum(distance[nearest], TINY)
+        return float(cosine.sum() / WALL_SECTORS)
 
 
 def crossings(place: np.ndarray, n: int, bonds: tuple[np.ndarray, np.ndarray], closed: bool) -> np.ndarray:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glsk_o3d.numerics.cycles import edges_on_cycles, inscribed_circle, minimum_cycle_basis
+from glsk_o3d.numerics.cycles import edges_on_cycles, inscribed_circle, minimum_cycle_basis, places_inside
 
 
 def basis_of(graph):
@@ -76,6 +76,19 @@ def test_inscribed_circle(name, size):
     centre, found = inscribed_circle(points)
     assert found == pytest.approx(radius * size, rel=0.015)
     assert np.linalg.norm(centre - middle) < (0.15 if name == "ellipse" else 0.03) * radius * size
+
+
+def test_places_inside_a_polygon_are_on_a_grid_in_its_plane():
+    """Of an L, without its corner."""
+    flat = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]], float)
+    points = np.column_stack([flat, 0 * flat[:, 0]]) @ TURN + 5
+    places, axes = places_inside(points, 15)
+    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
+    x, y, z = ((places - 5) @ TURN.T).T
+    np.testing.assert_allclose(z, 0, atol=1e-12)
+    assert ((x > 0) & (x < 2) & (y > 0) & (y < 2) & ((x < 1) | (y < 1))).all()
+    box = np.prod(np.ptp(points @ axes[:2].T, axis=0))
+    assert len(places) / 15**2 == pytest.approx(3 / box, rel=0.05)
 
 
 def test_curves_without_an_inside():

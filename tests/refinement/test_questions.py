@@ -11,7 +11,7 @@ from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
 from glsk_o3d.numerics.winding import AREA_NEIGHBOURS
 from glsk_o3d.refinement import spurs
 from glsk_o3d.refinement.evidence import LEAST_INSIDE, Evidence
-from glsk_o3d.refinement.loops import WIDE_OPEN, loop_facts
+from glsk_o3d.refinement.loops import CLEAR_SIGHT, loop_facts
 from glsk_o3d.samples.capsules import union_sample
 
 X, Y, Z = np.eye(3)
@@ -59,6 +59,12 @@ def strands(piped, gap, length, **options):
     return piped([*middle, [(-1, 0, 0), (-a, 0, 0)], [(a, 0, 0), (1, 0, 0)]], around=TUBE, **options)
 
 
+def facts_of_the_loop(ring):
+    cycles = minimum_cycle_basis(len(ring.vertices), ring.edges, ring.edge_lengths)
+    (loop,) = loop_facts(ring, cycles, Evidence.of(ring))
+    return loop.facts
+
+
 @pytest.mark.parametrize(("height", "clear"), [(None, True), (0.6, False), (1.5, True)])
 def test_one_sees_through_a_loop_if_no_surface_is_as_near_as_it_is_wide(piped, height, clear):
     ring = piped(TORUS)
@@ -68,9 +74,32 @@ def test_one_sees_through_a_loop_if_no_surface_is_as_near_as_it_is_wide(piped, h
         points, normals = np.vstack([ring.points, sheet]), np.vstack([ring.normals, np.tile(Z, (len(sheet), 1))])
         owner = np.concatenate([ring.vertex_of_point, np.zeros(len(sheet), int)])
         ring = replace(ring, points=points, normals=normals, vertex_of_point=owner)
-    cycles = minimum_cycle_basis(len(ring.vertices), ring.edges, ring.edge_lengths)
-    (loop,) = loop_facts(ring, cycles, evidence_of(ring.points, ring.normals))
-    assert (loop.facts["sight"] == WIDE_OPEN) if clear else (loop.facts["sight"] < 1)
+    passage = np.exp(facts_of_the_loop(ring)["passage"]) - 0.3
+    assert (passage > 0.9 * CLEAR_SIGHT) if clear else (passage < 0.5)
+
+
+def test_a_hole_in_the_data_has_no_walls(piped):
+    """The points around a torus's hole face it, those around a hole in a sheet are seen from the edge."""
+    ring = piped(TORUS)
+    flat = replace(ring, normals=np.tile(Z, (len(ring.points), 1)))
+    walled, open_ = (np.exp(facts_of_the_loop(each)["passage"]) - 0.3 for each in (ring, flat))
+    assert walled > 0.9 * CLEAR_SIGHT
+    assert open_ < 0.01
+
+
+def test_a_passage_is_found_beside_the_wall_of_a_pot(piped):
+    """The loop goes through the pot's middle, so that the wall crosses the largest circle in it."""
+    angle = np.linspace(-np.pi / 2, np.pi / 2, 9)
+    handle = np.column_stack([0.9 + 0.5 * np.cos(angle), 0.5 * np.sin(angle), 0 * angle])
+    loop = [[(0, -0.5, 0), *handle.tolist(), (0, 0.5, 0)], [(0, 0.5, 0), (0, -0.5, 0)]]
+    pot = piped(loop, around=[handle.tolist()])
+    y, turn = (each.ravel() for each in np.mgrid[-1:1:60j, 0 : 2 * np.pi : 120j])
+    out = np.column_stack([np.cos(turn), 0 * y, np.sin(turn)])
+    wall, middle = 0.9 * out + np.outer(y, Y), np.flatnonzero(np.abs(pot.vertices[:, 0]) < 0.01)
+    owner = middle[np.abs(y[:, None] - pot.vertices[middle, 1]).argmin(axis=1)]
+    points, normals = np.vstack([pot.points, wall]), np.vstack([pot.normals, out])
+    pot = replace(pot, points=points, normals=normals, vertex_of_point=np.append(pot.vertex_of_point, owner))
+    assert np.exp(facts_of_the_loop(pot)["passage"]) - 0.3 > 2
 
 
 @pytest.mark.parametrize("inside", [1, 0.35, 0.25, 0.1, -0.2])
