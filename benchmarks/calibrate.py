@@ -89,9 +89,7 @@ def check(
     ] = None,
     page: Annotated[
         Path | None,
-        typer.Option(
-            "--page", help="Put the first two tables into this page, a picture beside it.", callback=page_with("check")
-        ),
+        typer.Option("--page", help="Put the tables into this page, a picture beside it.", callback=page_with("check")),
     ] = None,
     jobs: Jobs = 2,
     output: Output = None,
@@ -109,7 +107,7 @@ def check(
     shown = tables(told)
     present(shown, markdown)
     if page is not None:
-        fill(page, {"check": shown[:2]})
+        fill(page, {"check": shown})
         draw_reliability(told, page.parent / "images")
 
 
