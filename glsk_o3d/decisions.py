@@ -37,7 +37,7 @@ QUESTIONS = {
         "loop closed",
         "handle",
         False,
-        dict(constant=-1.5, opening=2.2, passage=4.4, bonds=2.5),
+        dict(constant=-0.3, opening=1.5, passage=4.5, bonds=2.4),
     ),
     "limb": Question(
         "the branch at ({}) is a limb",

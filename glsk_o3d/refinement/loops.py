@@ -17,7 +17,7 @@ from .sections import VertexPoints
 
 WIDE_LOOP = 1.4  # fitted: surface distances, the radius of a loop that is more than two strands in one part
 WIDE_OPEN = 6.0  # fitted: spacings, its radius beyond which that says no more: crowns have wide false loops
-CLEAR_SIGHT = 3.0  # fitted: and that of what one sees through it
+CLEAR_SIGHT = 3.0  # fitted: spacings, the radius of what one sees through it beyond which that says no more
 LOOP_GRID = 15  # precision: of a grid across a loop, either way
 WALL_SECTORS = 16  # precision: directions around a place in which walls are looked for
 
@@ -71,14 +71,14 @@ class LoopEvidence(NamedTuple):
 def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> list[LoopEvidence]:
     """What speaks for and against that each of some loops is a handle.
 
-    The facts are logarithms: of the radius of the largest circle inside it, in spacings of the points; of how wide the
-    passage through it is, below; and of the least bonds that cross it somewhere, over their median.
+    The facts are logarithms: of the radius of the largest circle inside it, in spacings of the points, at most six; of
+    how wide the passage through it is, below; and of the least bonds that cross it somewhere, over their median.
 
     A loop is a handle if no disc that spans it stays inside. So the passage is at the place in its plane where the
     radius of the widest empty cylinder across it, as long either way as the circle and the distance of the surface
     together, times the share by which the winding number falls from the median along the loop, is largest. There it is
-    that radius, in spacings, times the share or, where that is less, how far the points around face the place: not
-    those around a hole in the data.
+    that radius, in spacings, at most three, times the share or, if that is less, times how far the points around face
+    the place. Those around a hole in the data do not.
     """
     if not cycles:
         return []
@@ -87,10 +87,11 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
     bonds, spacing = evidence.bonds(skeleton), max(evidence.spacing, TINY)
     loops = [skeleton.vertices[cycle] for cycle in cycles]
     views = [_View(loop, tube, evidence) for loop, tube in zip(loops, tubes, strict=True)]
-    asked = [*(view.places for view in views), *loops]
+    asked = [np.concatenate([view.places, loop]) for view, loop in zip(views, loops, strict=True)]
     winding = np.split(evidence.winding(np.concatenate(asked)), np.cumsum([len(each) for each in asked[:-1]]))
     found = []
-    for cycle, tube, view, there, along in zip(cycles, tubes, views, winding, winding[len(cycles) :], strict=False):
+    for cycle, tube, view, numbers in zip(cycles, tubes, views, winding, strict=True):
+        there, along = np.split(numbers, [len(view.places)])
         crossing = crossings(positions(cycle, len(surface)), len(cycle), bonds, closed=True)
         inside = float(np.median(along))
         fall = np.clip(1 - there / max(inside, LEAST_INSIDE), 0, 1)

@@ -11,7 +11,7 @@ from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
 from glsk_o3d.numerics.winding import AREA_NEIGHBOURS
 from glsk_o3d.refinement import spurs
 from glsk_o3d.refinement.evidence import LEAST_INSIDE, Evidence
-from glsk_o3d.refinement.loops import CLEAR_SIGHT, loop_facts
+from glsk_o3d.refinement.loops import CLEAR_SIGHT, WIDE_OPEN, loop_facts
 from glsk_o3d.samples.capsules import union_sample
 
 X, Y, Z = np.eye(3)
@@ -65,6 +65,10 @@ def facts_of_the_loop(ring):
     return loop.facts
 
 
+def passage_of(ring):
+    return np.exp(facts_of_the_loop(ring)["passage"]) - 0.3
+
+
 @pytest.mark.parametrize(("height", "clear"), [(None, True), (0.6, False), (1.5, True)])
 def test_one_sees_through_a_loop_if_no_surface_is_as_near_as_it_is_wide(piped, height, clear):
     ring = piped(TORUS)
@@ -74,17 +78,50 @@ def test_one_sees_through_a_loop_if_no_surface_is_as_near_as_it_is_wide(piped, h
         points, normals = np.vstack([ring.points, sheet]), np.vstack([ring.normals, np.tile(Z, (len(sheet), 1))])
         owner = np.concatenate([ring.vertex_of_point, np.zeros(len(sheet), int)])
         ring = replace(ring, points=points, normals=normals, vertex_of_point=owner)
-    passage = np.exp(facts_of_the_loop(ring)["passage"]) - 0.3
-    assert (passage > 0.9 * CLEAR_SIGHT) if clear else (passage < 0.5)
+    assert (passage_of(ring) > 0.9 * CLEAR_SIGHT) if clear else (passage_of(ring) < 0.5)
 
 
 def test_a_hole_in_the_data_has_no_walls(piped):
     """The points around a torus's hole face it, those around a hole in a sheet are seen from the edge."""
     ring = piped(TORUS)
-    flat = replace(ring, normals=np.tile(Z, (len(ring.points), 1)))
-    walled, open_ = (np.exp(facts_of_the_loop(each)["passage"]) - 0.3 for each in (ring, flat))
-    assert walled > 0.9 * CLEAR_SIGHT
-    assert open_ < 0.01
+    assert passage_of(ring) > 0.9 * CLEAR_SIGHT
+    assert passage_of(replace(ring, normals=np.tile(Z, (len(ring.points), 1)))) < 0.01
+
+
+def test_directions_without_points_have_no_walls(piped):
+    ring = piped(TORUS)
+    half = ring.points[:, 0] > -0.2
+    seen = replace(
+        ring, points=ring.points[half], normals=ring.normals[half], vertex_of_point=ring.vertex_of_point[half]
+    )
+    assert passage_of(seen) < 0.5 * CLEAR_SIGHT
+
+
+def test_the_wall_is_what_one_sees_first(piped):
+    """Behind it may be what is not seen: a wall around a ring, with upright normals."""
+    ring = piped(TORUS)
+    turn, z = (each.ravel() for each in np.mgrid[0 : 2 * np.pi : 200j, -0.1:0.1:8j])
+    behind = np.column_stack([1.5 * np.cos(turn), 1.5 * np.sin(turn), z])
+    points, normals = np.vstack([ring.points, behind]), np.vstack([ring.normals, np.tile(Z, (len(behind), 1))])
+    owner = np.append(ring.vertex_of_point, np.zeros(len(behind), int))
+    assert passage_of(replace(ring, points=points, normals=normals, vertex_of_point=owner)) > 0.9 * CLEAR_SIGHT
+
+
+def test_there_is_no_passage_inside_of_a_part(piped):
+    assert passage_of(strands(piped, 0.12, 1.5)) < 0.3
+
+
+def test_an_opening_of_so_many_spacings_is_wide_enough(piped):
+    assert facts_of_the_loop(piped(TORUS))["opening"] == pytest.approx(np.log(WIDE_OPEN + 0.5))
+
+
+@pytest.mark.parametrize("n", [1024, 4096])
+def test_sparse_bars_keep_their_loops(n):
+    corner = np.array(list(np.ndindex(2, 2, 2)), float)
+    bars = np.array([(i, j) for i in range(8) for j in range(i) if np.abs(corner[i] - corner[j]).sum() == 1])
+    for seed in range(3):
+        frame = union_sample("frame", corner, bars, np.full(8, 0.12), n, 0.0, seed)
+        assert skeletonize(frame.points).n_loops == 5
 
 
 def test_a_passage_is_found_beside_the_wall_of_a_pot(piped):
@@ -99,7 +136,7 @@ def test_a_passage_is_found_beside_the_wall_of_a_pot(piped):
     owner = middle[np.abs(y[:, None] - pot.vertices[middle, 1]).argmin(axis=1)]
     points, normals = np.vstack([pot.points, wall]), np.vstack([pot.normals, out])
     pot = replace(pot, points=points, normals=normals, vertex_of_point=np.append(pot.vertex_of_point, owner))
-    assert np.exp(facts_of_the_loop(pot)["passage"]) - 0.3 > 2
+    assert passage_of(pot) > 0.5 * CLEAR_SIGHT
 
 
 @pytest.mark.parametrize("inside", [1, 0.35, 0.25, 0.1, -0.2])
