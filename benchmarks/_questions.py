@@ -30,8 +30,8 @@ STEP = 0.3  # between places on the true axis, in median radii
 CANDIDATES = 32  # nearest places, of which the one counts whose ball is nearest: thin parts grow out of thick ones
 NEAR = 4  # edges on either side of the weakest place of a branch in which it may cross air
 AIR_WAY, AIR_RADII = 2.0, 3.0  # across air is what is so many times farther along the axis, and so many radii more
-BENT_WAY = 1.2  # times farther along the axis than straight on is another way, perhaps
-NEXT_TO_NOTHING = 1e-3  # what it costs to go along the axis inside
+BENT_WAY = 1.2  # what is so many times farther along the axis than straight on may go round and not through
+NEXT_TO_NOTHING = 1e-3  # cost of a way in whose balls a place is, in least radii; outside, the distance from them
 SAME_WAY, SAME_RADII = 1.5, 2.0  # and with a gap in one part the axis goes on no farther round than that
 
 

@@ -113,17 +113,11 @@ def inscribed_circle(points: np.ndarray) -> tuple[np.ndarray, float]:
 
     The centre is found on a grid that is refined twice; the radius is good to about 1 %.
     """
-    middle = points.mean(axis=0)
-    axes = np.linalg.svd(points - middle, full_matrices=False)[2]
-    polygon = (points - middle) @ axes.T
-    low, high = polygon[:, :2].min(axis=0), polygon[:, :2].max(axis=0)
+    middle, axes, ends, low, high = _flattened(points)
     centre, best = np.zeros(3), 0.0
     at, span = (low + high) / 2, high - low
-    ends = polygon, np.concatenate([polygon[1:], polygon[:1]])  # of its edges
     for n in (21, 11, 11):
-        x, y = (np.linspace(-0.5, 0.5, n)[:, None] * span + at).T
-        grid = np.stack([*np.meshgrid(x, y), np.zeros((n, n))], axis=-1).reshape(-1, 3)
-        grid = grid[_inside(grid, *ends)]
+        grid = _grid(np.linspace(-0.5, 0.5, n)[:, None] * span + at, *ends)
         if len(grid):
             distance = _distance(grid, *ends)
             if distance.max() > best:
@@ -137,13 +131,26 @@ def places_inside(points: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
 
     The rows of the axes (3, 3) are unit vectors, the last one the normal.
     """
+    middle, axes, ends, low, high = _flattened(points)
+    return _grid(low + (np.arange(n)[:, None] + 0.5) / n * (high - low), *ends) @ axes + middle, axes
+
+
+def _flattened(
+    points: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray], np.ndarray, np.ndarray]:
+    """Middle and axes of a closed polygon's plane; in these both ends of its edges, and its box in the plane."""
     middle = points.mean(axis=0)
     axes = np.linalg.svd(points - middle, full_matrices=False)[2]
     polygon = (points - middle) @ axes.T
-    low, high = polygon[:, :2].min(axis=0), polygon[:, :2].max(axis=0)
-    x, y = (low + (np.arange(n)[:, None] + 0.5) / n * (high - low)).T
-    grid = np.stack([*np.meshgrid(x, y), np.zeros((n, n))], axis=-1).reshape(-1, 3)
-    return grid[_inside(grid, polygon, np.roll(polygon, -1, axis=0))] @ axes + middle, axes
+    ends = polygon, np.concatenate([polygon[1:], polygon[:1]])
+    return middle, axes, ends, polygon[:, :2].min(axis=0), polygon[:, :2].max(axis=0)
+
+
+def _grid(places: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Of the grid of the coordinates of some places (n, 2) what is inside of edges from a to b, (g, 3) float array."""
+    x, y = np.meshgrid(*places.T)
+    grid = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    return grid[_inside(grid, a, b)]
 
 
 def _distance(points: np.ndarray, polygon: np.ndarray, after: np.ndarray) -> np.ndarray:

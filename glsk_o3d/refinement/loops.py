@@ -129,8 +129,7 @@ class _View:
         near = np.abs(points[:, 2]) < self.radius + tube
         self._points, self._normals = points[near, :2], evidence.normals[near] @ axes[:2].T
         self._places = (self.places - self.centre) @ axes[:2].T
-        free = np.full(len(self.places), self.radius)
-        self.sight = cKDTree(self._points).query(self._places)[0] if near.any() else free
+        self.sight = cKDTree(self._points).query(self._places)[0] if near.any() else np.zeros(len(self.places))
 
     def walls(self, place: int) -> float:
         """How far the nearest points all around a place face it: the mean cosine, of no points 0."""
