@@ -12,7 +12,7 @@ from .numerics.cotangent import cotangent_laplacian
 from .numerics.eigen import largest_eigenvalue
 from .numerics.neighbourhoods import wide_covariances
 from .numerics.rings import Rings
-from .numerics.solver import SolveError, solve_contraction
+from .numerics.solver import Elimination, SolveError, solve_contraction
 from .numerics.vectors import TINY
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch, with_filters
@@ -100,11 +100,11 @@ class Contractor(Filter[Contraction]):
         Contraction
             Its report has no stage of this filter.
         """
-        reducer = self.reducer
+        reducer, elimination = self.reducer, Elimination()
         for _ in range(self.max_iterations):
             start, before = time.perf_counter(), state
             try:
-                state, facts = self._solve(state, laplacian)
+                state, facts = self._solve(state, laplacian, elimination)
             except SolveError as problem:
                 return _finished(state, f"solve {len(state.report.iterations) + 1} {REFUSED}: {problem}")
             state = _record(state, **facts, seconds=time.perf_counter() - start)
@@ -113,6 +113,8 @@ class Contractor(Filter[Contraction]):
                 n, state = len(state), _reduced(state, reducer, start)
                 if len(state) == n:
                     reducer = None  # as in the published code, which gives up after a pass without a merge
+                else:
+                    elimination = Elimination()
             if watch is not None and watch(state) is False and reason is None:
                 return _finished(state, STOPPED_BY_CALLER)
             if reason is not None:
@@ -121,7 +123,9 @@ class Contractor(Filter[Contraction]):
                 return _finished(kept, reason, converged=True)
         return _finished(state, f"reached max_iterations = {self.max_iterations}")
 
-    def _solve(self, state: Contraction, laplacian_of: Laplacian) -> tuple[Contraction, dict[str, Any]]:
+    def _solve(
+        self, state: Contraction, laplacian_of: Laplacian, elimination: Elimination
+    ) -> tuple[Contraction, dict[str, Any]]:
         """One contraction step: equations 2, 4 and 5; 3 is `solve_contraction`."""
         # Wen (4)
         contraction = state.contraction_weight * self.amplification or self.initial_contraction / state.mean_ring_edge
@@ -133,7 +137,7 @@ class Contractor(Filter[Contraction]):
             attraction = np.where(line, self.line_hold, 1) * attraction
         attraction = np.minimum(attraction, self.max_attraction)
         laplacian, mass = laplacian_of(state), np.sqrt(state.mass)
-        positions, facts = self._solve_in_box(state, laplacian, contraction / mass, attraction, mass)
+        positions, facts = self._solve_in_box(state, laplacian, contraction / mass, attraction, mass, elimination)
         _, ring_size = state.rings.nearest(positions)
         contracted = replace(
             state,
@@ -155,12 +159,13 @@ class Contractor(Filter[Contraction]):
         row_weight: np.ndarray,
         attraction: np.ndarray,
         mass: np.ndarray,
+        elimination: Elimination,
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """Solve; as long as that throws points out of the box, hold these and solve again."""
         held = np.zeros(len(state), bool)
         for _ in range(self.retries + 1):
             weight = np.where(held, self.max_attraction, attraction) * mass
-            positions, error = solve_contraction(laplacian, row_weight, weight, state.positions)
+            positions, error = solve_contraction(laplacian, row_weight, weight, state.positions, elimination)
             outside = state.frame.beyond(positions)
             if not outside.any():
                 return positions, dict(n_held=int(held.sum()), solve_error=error)

@@ -1,6 +1,6 @@
 """Contractor: the solve by its definition, the weights, the guards, and closed forms."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from unittest.mock import Mock
 
 import numpy as np
@@ -67,7 +67,7 @@ def test_going_on_is_the_same_as_not_having_stopped(built):
     for reducer in (None, LPRReducer()):
         through = Contractor(reducer=reducer, stop=never, max_iterations=4)(built)
         half = Contractor(reducer=reducer, stop=never, max_iterations=2)
-        same(half(half(built)), through)
+        same(half(half(built)), through, rounding=1e-9)  # the order in which unknowns are eliminated is found again
         assert [record.iteration for record in through.report.iterations] == [1, 2, 3, 4]
 
 
@@ -171,11 +171,15 @@ def test_progress_is_told_once_per_solve_and_can_stop_the_run(built):
 # ---- the guards
 
 
-def same(a, b):
-    for name in ("positions", "previous", "survivors", "representative", "mass", "ring_size", "laplacian_coordinates"):
+def same(a, b, rounding=0.0):
+    for name in ("survivors", "representative", "mass"):
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=name)
+    for name in ("positions", "previous", "ring_size", "laplacian_coordinates"):
+        np.testing.assert_allclose(getattr(a, name), getattr(b, name), rtol=0, atol=rounding, err_msg=name)
     assert a.contraction_weight == b.contraction_weight
-    assert [replace(r, seconds=0) for r in a.report.iterations] == [replace(r, seconds=0) for r in b.report.iterations]
+    for one, other in zip(a.report.iterations, b.report.iterations, strict=True):
+        facts, others = (asdict(replace(record, seconds=0, solve_error=0)) for record in (one, other))
+        assert facts == pytest.approx(others, rel=0, abs=rounding)
 
 
 GRID = np.stack(np.meshgrid(*[np.arange(6.0)] * 3), -1).reshape(-1, 3)
@@ -226,9 +230,9 @@ class Capture:
         self.calls, self.solve, self.thrown = [], module.solve_contraction, list(thrown)
         monkeypatch.setattr(module, "solve_contraction", self)
 
-    def __call__(self, laplacian, row_weight, weight, points):
+    def __call__(self, laplacian, row_weight, weight, points, elimination):
         self.calls.append((row_weight, weight))
-        positions, error = self.solve(laplacian, row_weight, weight, points)
+        positions, error = self.solve(laplacian, row_weight, weight, points, elimination)
         positions = positions.copy()
         for point in self.thrown:
             if weight[point] < 1e4:

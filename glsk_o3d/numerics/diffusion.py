@@ -20,7 +20,7 @@ class Diffusion:
     def __init__(self, points: np.ndarray, neighbours: np.ndarray) -> None:
         n, k = neighbours.shape
         row, column = np.repeat(np.arange(n), k - 1), neighbours[:, 1:].ravel()
-        links = csr_array((np.full(len(row), 0.5), (row, column)), shape=(n, n))
+        links = csr_array((np.full(len(row), 0.5), column, (k - 1) * np.arange(n + 1)), shape=(n, n))
         self._links = (links + links.T).tocsr()
         offset = points.take(row, axis=0) - points.take(column, axis=0)
         squared = dot(offset, offset) / 2
@@ -36,17 +36,21 @@ class Diffusion:
         diagonal = np.maximum(hold + self._degree, TINY).repeat(values.shape[1]).reshape(values.shape)
         mean: Floats = values.mean(axis=0)  # what is far from the origin would lose digits
         found: Floats = values - mean
-        residual = self._links @ found - self._degree[:, None] * found
-        ahead = step = residual / diagonal
-        size = (residual * step).sum()  # of all columns: those of positions turn with them
+        residual, inverse = self._links @ found - self._degree[:, None] * found, 1 / diagonal
+        ahead = residual * inverse
+        size = np.einsum("nc,nc->", residual, ahead)  # of all columns: those of positions turn with them
         for _ in range(DIFFUSION_STEPS):
-            curved = diagonal * ahead - self._links @ ahead
-            bend = (ahead * curved).sum()
+            curved = diagonal * ahead
+            curved -= self._links @ ahead
+            bend = np.einsum("nc,nc->", ahead, curved)
             if not bend > LEAST_BEND * size:
                 break
             share = size / bend
-            found, residual = found + share * ahead, residual - share * curved
-            step = residual / diagonal
-            before, size = size, (residual * step).sum()
-            ahead = step + size / before * ahead
+            curved *= share
+            residual -= curved
+            found += np.multiply(ahead, share, out=curved)
+            step = np.multiply(residual, inverse, out=curved)
+            before, size = size, np.einsum("nc,nc->", residual, step)
+            ahead *= size / before
+            ahead += step
         return found + mean

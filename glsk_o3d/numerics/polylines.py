@@ -83,12 +83,14 @@ def nearest_on_edges(
     lengths = np.maximum((ways * ways).sum(axis=0), TINY)  # squared
     for column in candidates.T:
         some = np.flatnonzero(column >= 0)
-        column = column[some]
-        along, offset = ways.take(column, axis=1), p.take(some, axis=1) - starts.take(column, axis=1)
-        part = np.clip((along * offset).sum(axis=0) / lengths.take(column), 0, 1)
+        every = len(some) == len(column)  # mostly of the first edge: there is nothing to take
+        column, here, least = (column, p, best) if every else (column[some], p.take(some, axis=1), best[some])
+        along, offset = ways.take(column, axis=1), here - starts.take(column, axis=1)
+        part = (along * offset).sum(axis=0) / lengths.take(column)
+        np.clip(part, 0, 1, out=part)
         offset -= part * along
         squared = (offset * offset).sum(axis=0)
-        nearer = squared < (1 - NEAREST_TIE) * best[some]  # a vertex belongs to all its edges: rounding must not choose
+        nearer = np.flatnonzero(squared < (1 - NEAREST_TIE) * least)  # a vertex has several: rounding must not choose
         some = some[nearer]
         edge[some], t[some], best[some] = column[nearer], part[nearer], squared[nearer]
     return edge, t

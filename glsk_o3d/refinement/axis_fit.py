@@ -64,7 +64,8 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
     vertices, so that the curve does not bend within a half width. The nearest place of a wiggly curve has its wiggle:
     it is smoothed on the surface by .6 half widths, and x(p) is the place nearest to that.
 
-    K is 0, since the axis of half a tube is off the centroid of its points, but where it is to `settle` the curve:
+    K is 0, since the axis of half a tube is off the centroid of its points, but where it is to `settle` a curve that
+    was fitted before, whose half widths are known:
 
     .. math:: K = \mu d I_\perp + \max(1 - a / a_0, 0)\, e e^T
 
@@ -92,30 +93,31 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
     vertex, edges_at = owner[points], incident_edges(ends, m)
     pattern = _Pattern(skeleton, edges_at)
     low, high = axis_box(p)
-    near = _nearest(x, ends, *nearest_on_edges(x, ends, edges_at[vertex], p), p, n, skeleton.radii)
+    onto = nearest_on_edges(x, ends, edges_at[vertex], p)
     if passes:
         surface = surface or SurfaceGraph.of(skeleton)
         smooth = _smoother(surface, points, p)
         spacing = surface.spacing * np.sqrt(len(surface.points) / len(points))
+        width = skeleton.half_width if settle else _nearest(x, ends, *onto, p, n, skeleton.radii).width
     for again in range(passes):
-        onto = nearest_on_edges(x, ends, edges_at[vertex], p) if again else (near.edge, near.share[:, 1])
-        place = smooth(places_on_edges(x, ends, *onto), FIT_DIFFUSION * near.width[vertex])
+        onto = nearest_on_edges(x, ends, edges_at[vertex], p) if again else onto
+        place = smooth(places_on_edges(x, ends, *onto), FIT_DIFFUSION * width[vertex])
         vertex, edge, t = _walked(x, ends, edges_at, vertex, place)
         near = _nearest(x, ends, edge, t, p, n, skeleton.radii, sides=settle)
-        x = _solve(x, near, p, pattern, settle)
+        x, width = _solve(x, near, p, pattern, settle), near.width
         # normals that mean nothing may meet anywhere
         x = np.where(skeleton.degree[:, None] > 0, np.clip(x, low, high), x)
-    if passes:
-        onto = nearest_on_edges(x, ends, edges_at[vertex], place)
-        near = _nearest(x, ends, *onto, p, n, skeleton.radii, sides=settle)
-        owner[points] = vertex
+    onto = nearest_on_edges(x, ends, edges_at[vertex], place) if passes else onto
+    near = _nearest(x, ends, *onto, p, n, skeleton.radii, sides=settle)
+    owner[points] = vertex
     radii = plane_distance_radii(x + centre, owner, skeleton.points, skeleton.normals, skeleton.radii)
     if passes:  # the distance from a curve that nobody has centred is no radius
         equal = np.where(near.support > 0, near.sections.radius, radii)
         radii = robust_radii(equal, norm(near.offset), near.doubt, n, vertex)
     doubt = np.minimum(near.doubt, _flat_doubt(near, spacing)) if passes and settle else near.doubt
     confidence = (1 - doubt) * near.support / (near.support + HALF_SUPPORT)
-    return with_fields(skeleton, vertices=x + centre, confidence=confidence, radii=radii, vertex_of_point=owner)
+    made = dict(vertices=x + centre, confidence=confidence, radii=radii, vertex_of_point=owner)
+    return with_fields(skeleton, **made, half_width=near.width, half_thickness=near.sections.half_thickness)
 
 
 def _walked(

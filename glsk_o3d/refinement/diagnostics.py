@@ -8,6 +8,7 @@ from ..decisions import coordinates
 from ..numerics.groups import component_labels, group_median, group_sum
 from ..numerics.vectors import dot, norm
 from ..skeleton import Skeleton
+from .merging import with_fields
 from .sections import VertexPoints, measure_sections
 
 SHEET_SHARE = 0.9  # fitted: share of one direction among the normals around a vertex; a tube has 0.5, half a tube too
@@ -30,7 +31,7 @@ def measured(skeleton: Skeleton) -> Skeleton:
     They take the place of those of before, and follow what other filters warned of.
     """
     sections = measure_sections(skeleton)
-    skeleton = replace(skeleton, half_width=sections.half_width, half_thickness=sections.half_thickness)
+    skeleton = with_fields(skeleton, half_width=sections.half_width, half_thickness=sections.half_thickness)
     others = [message for message in skeleton.report.warnings if message.partition(":")[0] not in REASONS]
     return replace(skeleton, report=replace(skeleton.report, warnings=(*others, *diagnose(skeleton))))
 

@@ -16,6 +16,7 @@ from ..numerics.vectors import TINY, Floats, cross, dot, norm, unit
 from ..skeleton import NOT_MEASURED, Skeleton
 from .axis_fit import axis_box
 from .limbs import AXIS_LENGTH
+from .merging import with_fields
 from .sections import Sections, VertexPoints, measure_sections
 
 END_CUT = 1.75  # fitted: distance from where the points stop, in larger half widths, within which a cap bends the curve
@@ -325,4 +326,4 @@ def _replanted(skeleton: Skeleton, grown: list[_Grown]) -> Skeleton:
     section = measure_sections(replanted).radius
     new = np.flatnonzero(keep) >= len(skeleton.vertices)
     # without points a vertex has no section, and keeps the radius of the run
-    return replace(replanted, radii=np.where(new & (section > 0), section, replanted.radii))
+    return with_fields(replanted, radii=np.where(new & (section > 0), section, replanted.radii))

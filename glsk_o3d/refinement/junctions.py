@@ -53,9 +53,10 @@ def move_junctions(skeleton: Skeleton) -> Skeleton:
     """
     if not len(skeleton.junctions) and not skeleton.n_loops:
         return skeleton
+    known = dict[bytes, _Place]()
     while True:
         limbs = Limbs(skeleton)
-        places = _places(skeleton, limbs)
+        places = _places(skeleton, limbs, known)
         merged = _merged(skeleton, limbs, places)
         if merged is None:
             break
@@ -63,16 +64,22 @@ def move_junctions(skeleton: Skeleton) -> Skeleton:
     handles = Handles(skeleton)
     if handles.some:
         limbs = Limbs(skeleton, handles.bodies)
-        places = _places(skeleton, limbs, handles)
+        places = _places(skeleton, limbs, {}, handles)
     return _straightened(skeleton, limbs, places)
 
 
-def _places(skeleton: Skeleton, limbs: Limbs, handles: Handles | None = None) -> dict[int, _Place]:
-    """Where every junction belongs."""
+def _places(
+    skeleton: Skeleton, limbs: Limbs, known: dict[bytes, _Place], handles: Handles | None = None
+) -> dict[int, _Place]:
+    """Where every junction belongs, if that is not known of the same limbs from before others were merged."""
     cloud = handles.cloud if handles else VertexPoints(skeleton)
     low, high = axis_box(cloud.points if len(cloud.points) else skeleton.vertices)
     found = {}
     for junction in sorted(limbs.at):
+        name = limbs.signature(junction)
+        if name in known:
+            found[junction] = known[name]
+            continue
         here, lines, radius, around = limbs.at[junction], [], 0.0, []
         body = handles.body([limbs.paths[limb] for limb in here]) if handles else None
         for limb in here:
@@ -93,7 +100,7 @@ def _places(skeleton: Skeleton, limbs: Limbs, handles: Handles | None = None) ->
             near = np.linalg.norm(place - body.middle) < body.half_width / 2
             place = place if len(lines) > 2 and near else body.middle
         place = np.clip(place, low, high)  # normals that mean nothing may meet anywhere
-        found[junction] = _Place(place, touching, [_entering(line, place) for line in lines])
+        known[name] = found[junction] = _Place(place, touching, [_entering(line, place) for line in lines])
     return found
 
 

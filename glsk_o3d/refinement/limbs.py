@@ -73,6 +73,11 @@ class Limbs:
                     self.branch.append(number)
         self.axis = cache(self._axis)
 
+    def signature(self, junction: int) -> bytes:
+        """What is equal of two junctions if their limbs are: what was found out about one is known of the other."""
+        paths = [self.paths[limb] for limb in self.at[junction]]
+        return b"".join(each[path].tobytes() for path in paths for each in (self.vertices, self.surface))
+
     def _axis(self, limb: int) -> tuple[np.ndarray, np.ndarray]:
         """The last undisturbed place of a limb, and its direction there, towards the junction."""
         path, radius = self.paths[limb], self.radius[self.branch[limb]]

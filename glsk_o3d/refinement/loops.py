@@ -29,10 +29,14 @@ def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
     decision for each loop of the minimum cycle bases, closed or left.
     """
     decisions: list[Decision] = []
+    known = dict[bytes, LoopEvidence]()
     while True:
         cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
+        names = [skeleton.vertices[cycle].tobytes() for cycle in cycles]
+        fresh = {name: cycle for name, cycle in zip(names, cycles, strict=True) if name not in known}
+        known.update(zip(fresh, loop_facts(skeleton, [*fresh.values()], evidence), strict=True))
         kept, narrow, cut, used = list[Decision](), [], [], set[int]()
-        for cycle, loop in zip(cycles, loop_facts(skeleton, cycles, evidence), strict=True):
+        for cycle, loop in zip(cycles, (known[name] for name in names), strict=True):
             false = loop.probability < least
             where = tuple(loop.centre.tolist())
             (decisions if false else kept).append(Decision("loop", where, loop.probability, false))

@@ -44,7 +44,7 @@ def merge_into(skeleton: Skeleton, into: np.ndarray) -> Skeleton:
     Points of merged vertices belong to the one that stays.
     """
     stay = np.unique(into)
-    return replace(merge_vertices(skeleton, into), **some_vertices(skeleton, stay))
+    return with_fields(merge_vertices(skeleton, into), **some_vertices(skeleton, stay))
 
 
 def drop_edges(skeleton: Skeleton, gone: ArrayLike) -> Skeleton:
@@ -83,9 +83,9 @@ def binary_size(skeleton: Skeleton) -> float:
 
 
 def scaled(skeleton: Skeleton, factor: float) -> Skeleton:
-    """The same in another unit of length: vertices, radii and points."""
-    vertices, points, radii = (factor * values for values in (skeleton.vertices, skeleton.points, skeleton.radii))
-    return with_fields(skeleton, vertices=vertices, points=points, radii=radii)
+    """The same in another unit of length."""
+    lengths = ("vertices", "points", "radii", "half_width", "half_thickness")
+    return with_fields(skeleton, **{name: factor * getattr(skeleton, name) for name in lengths})
 
 
 def collapse_triangles(skeleton: Skeleton, by_degree: bool = False) -> Skeleton:
@@ -105,12 +105,12 @@ def collapse_triangles(skeleton: Skeleton, by_degree: bool = False) -> Skeleton:
         degree = (len(around[a]) + len(around[b])) / 2 if by_degree else 0.0
         return degree, math.dist(position[a], position[b])
 
-    queue = [(*cost(a, b), a, b) for a, b in skeleton.edges.tolist() if around[a] & around[b]]
+    queue = [(*cost(a, b), a, b) for a, b in skeleton.edges.tolist() if not around[a].isdisjoint(around[b])]
     heapq.heapify(queue)
     representative = list(range(len(position)))
     while queue:
         *priced, a, b = heapq.heappop(queue)
-        if b not in around[a] or not around[a] & around[b]:
+        if b not in around[a] or around[a].isdisjoint(around[b]):
             continue
         if tuple(priced) != cost(a, b):
             heapq.heappush(queue, (*cost(a, b), a, b))
@@ -125,9 +125,12 @@ def collapse_triangles(skeleton: Skeleton, by_degree: bool = False) -> Skeleton:
                 around[c].add(a)
                 around[a].add(c)
         around[b].clear()
-        # The merge changes the degrees around it and makes new triangles: price all that may have become cheaper.
-        for c in {a, *around[a]}:
-            for d in around[c]:
-                if around[c] & around[d]:
-                    heapq.heappush(queue, (*cost(c, d), c, d))
+        # Edges at the merged vertex have other lengths, and those across from it may be on new triangles, or have ends
+        # of less degree: price all that may have become cheaper.
+        for c in around[a]:
+            for d in around[c] if by_degree else around[c] & around[a]:
+                if not around[c].isdisjoint(around[d]):
+                    heapq.heappush(queue, (*cost(*sorted((c, d))), *sorted((c, d))))
+            if not around[a].isdisjoint(around[c]):
+                heapq.heappush(queue, (*cost(*sorted((a, c))), *sorted((a, c))))
     return merge_vertices(skeleton, final_representatives(np.array(representative, int)))

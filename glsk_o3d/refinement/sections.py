@@ -122,9 +122,11 @@ def half_axes(moments: np.ndarray, otherwise: np.ndarray) -> Sections:
     known = share[:, 1:] > LEAST_SHARE * share.sum(axis=1, keepdims=True)
     # in units in which N is 1 the extremes of h are eigenvalues
     plane = axes[:, :, 1:] / np.sqrt(np.where(known, share[:, 1:], 1))[:, None]
-    reach = known[:, :, None] * known[:, None] * np.einsum("mik,mij,mjl->mkl", plane, moments[:, 6:][:, FULL], plane)
-    unseen = np.where(known | np.isnan(otherwise)[:, None], 0, otherwise[:, None])
-    half, turn = np.linalg.eigh(reach + unseen[:, None] * np.eye(2))
-    half = np.maximum(half, 0)  # rounding may leave less than nothing
-    across = unit(np.einsum("mik,mk->mi", plane, turn[:, :, 1]))
-    return Sections(half[:, 1], half[:, 0], across)
+    reach = plane.transpose(0, 2, 1) @ moments[:, 6:][:, FULL] @ plane
+    unseen = np.where(np.isnan(otherwise), 0, otherwise)
+    one, other = (np.where(seen, reach[:, i, i], unseen) for i, seen in enumerate(known.T))
+    mean, lean, both = (one + other) / 2, (one - other) / 2, np.where(known.all(axis=1), reach[:, 0, 1], 0)
+    apart, turn = np.hypot(lean, both), np.arctan2(both, lean)[:, None] / 2
+    across = unit(np.cos(turn) * plane[:, :, 0] + np.sin(turn) * plane[:, :, 1])
+    # rounding may leave less than nothing
+    return Sections(np.maximum(mean + apart, 0), np.maximum(mean - apart, 0), across)

@@ -39,9 +39,9 @@ def prune_spurs(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
     end, cut or left; at its end.
     """
     decisions: list[Decision] = []
-    given = skeleton
+    given, known = skeleton, dict[bytes, dict[str, float]]()
     while True:
-        found = _with_forks(skeleton, list(_twigs(skeleton, evidence)))
+        found = _with_forks(skeleton, _twigs(skeleton, evidence, known))
         worst: dict[int, _Twig] = {}
         for twig in found:
             before = worst.get(twig.junction)
@@ -70,7 +70,7 @@ def limb_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[int, di
     out that has the object beside it; how certain it is, minus the logarithm of what its mean confidence lacks of 1;
     and how round the part is at the junction.
     """
-    return ((twig.tip, twig.facts) for twig in _twigs(skeleton, evidence))
+    return ((twig.tip, twig.facts) for twig in _twigs(skeleton, evidence, {}))
 
 
 class _Twig(NamedTuple):
@@ -87,13 +87,28 @@ class _Twig(NamedTuple):
         return self.other * QUESTIONS["limb"].probability(self.facts)
 
 
-def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
+def _twigs(skeleton: Skeleton, evidence: Evidence, known: dict[bytes, dict[str, float]]) -> list[_Twig]:
+    """Branches that leave a junction and have an end, with their facts, which are asked for where they are not known.
+
+    What is known is that of the same limbs, from before other branches were cut.
+    """
     limbs, degree = Limbs(skeleton), skeleton.degree
     paths = enumerate(branch[::-1] if degree[branch[0]] == 1 else branch for branch in limbs.branches)
     found = [(k, path) for k, path in paths if degree[path[0]] > 2 and degree[path[-1]] == 1]
-    if not found:
-        return
-    cloud, sections = VertexPoints(skeleton), measure_sections(skeleton)
+    names = [limbs.signature(int(path[0])) + skeleton.vertices[path].tobytes() for _, path in found]
+    fresh = {name: branch for name, branch in zip(names, found, strict=True) if name not in known}
+    if fresh:
+        known.update(zip(fresh, _facts(skeleton, evidence, limbs, [*fresh.values()]), strict=True))
+    return [
+        _Twig(int(path[0]), path[1:], int(path[-1]), known[name]) for (_, path), name in zip(found, names, strict=True)
+    ]
+
+
+def _facts(
+    skeleton: Skeleton, evidence: Evidence, limbs: Limbs, found: list[tuple[int, np.ndarray]]
+) -> Iterator[dict[str, float]]:
+    """What speaks for some branches, given by their numbers and as paths from their junctions."""
+    degree, cloud, sections = skeleton.degree, VertexPoints(skeleton), measure_sections(skeleton)
     count, wide = cloud.mass, sections.half_width
     roundness = np.nan_to_num(sections.half_thickness / np.maximum(wide, TINY))
     confidence = np.nan_to_num(skeleton.confidence)
@@ -106,18 +121,17 @@ def _twigs(skeleton: Skeleton, evidence: Evidence) -> Iterator[_Twig]:
     half = np.array([np.average(wide[part], weights=count[part]) for part in outside])
     beside = _beside(evidence, skeleton.vertices, sections.across, [path for _, path in found], half)
     for (k, path), part, own_half, shared in zip(found, outside, half, beside, strict=True):
-        junction, body, tip = int(path[0]), path[1:], int(path[-1])
+        junction, body = int(path[0]), path[1:]
         own = cloud.points[cloud.members.of(part)]
         # by how far they are, and not as they come, which depends on how the object is turned
         points = own[np.argsort(norm(own - skeleton.vertices[junction]))][:: len(own) // SPUR_POINTS + 1]
         out = max(_standing_out(limbs, k, junction, points, ending), 0.0) if own_half > 0 else 0.0
         protrusion = float(np.log(out / max(own_half, TINY) + LEAST_OUT))
-        facts = dict(
+        yield dict(
             protrusion=protrusion - float(shared) * max(protrusion, 0),
             certainty=-float(np.log1p(-np.average(confidence[body], weights=count[body]))),
             roundness=float(roundness[junction]),
         )
-        yield _Twig(junction, body, tip, facts)
 
 
 def _outside(vertices: np.ndarray, path: np.ndarray, surface: float, wide: np.ndarray) -> np.ndarray:

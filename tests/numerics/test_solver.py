@@ -5,8 +5,9 @@ import pytest
 from scipy.sparse import csr_matrix
 
 from glsk_o3d import samples
+from glsk_o3d.numerics import solver as module
 from glsk_o3d.numerics.cotangent import cotangent_laplacian
-from glsk_o3d.numerics.solver import SolveError, solve_contraction
+from glsk_o3d.numerics.solver import Elimination, SolveError, solve_contraction
 from glsk_o3d.ring_builder import RingBuilder
 
 
@@ -85,3 +86,20 @@ def test_refuses_what_has_no_trustworthy_solution(spoil):
     system = spoil(laplacian, np.full(len(points), 5.0), np.ones(len(points)), points)
     with pytest.raises(SolveError):
         solve_contraction(*system)
+
+
+def test_order_of_elimination_is_kept(monkeypatch):
+    """The second system with the same links is solved as the first, without looking for the order again."""
+    laplacian, points, size = small_system("torus")
+    rows, attraction, elimination = np.full(len(points), 0.5), size.mean() / size, Elimination()
+    solve_contraction(laplacian, rows, attraction, points, elimination)
+    np.testing.assert_array_equal(np.sort(elimination.place), np.arange(len(points)))
+    ordered = []
+    factorised = module.factorised
+    monkeypatch.setattr(
+        module, "factorised", lambda *given, **options: ordered.append(given[1:]) or factorised(*given, **options)
+    )
+    x, _ = solve_contraction(laplacian, 3 * rows, attraction, points, elimination)
+    alone, _ = solve_contraction(laplacian, 3 * rows, attraction, points)
+    assert ordered == [(True,), (False,)]
+    np.testing.assert_allclose(x, alone, rtol=0, atol=1e-9)

@@ -32,8 +32,8 @@ def placed():
     def make(skeleton, scale=1.0, shift=0.0):
         turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
         vertices, points = (scale * places @ turn + shift for places in (skeleton.vertices, skeleton.points))
-        radii = scale * skeleton.radii
-        return replace(skeleton, vertices=vertices, points=points, normals=skeleton.normals @ turn, radii=radii), turn
+        lengths = {name: scale * getattr(skeleton, name) for name in ("radii", "half_width", "half_thickness")}
+        return replace(skeleton, vertices=vertices, points=points, normals=skeleton.normals @ turn, **lengths), turn
 
     return make
 
