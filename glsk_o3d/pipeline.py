@@ -6,6 +6,7 @@ import dataclasses
 import logging
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from copy import copy
 from itertools import pairwise
 from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
 
@@ -190,7 +191,8 @@ class Pipeline(Generic[Produced]):
                 report = with_stage(report, stage, seconds)
             else:
                 report = with_stage(with_filters(data.report, report), stage, seconds)
-                data = dataclasses.replace(data, report=report)
+                data = copy(data)  # as it is: to check it once more would take longer
+                object.__setattr__(data, "report", report)
         warn(message for message in report.warnings if message not in told)
         produced: Produced = data
         return produced

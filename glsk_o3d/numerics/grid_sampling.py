@@ -107,7 +107,7 @@ def sample_grid(points: np.ndarray, n: int) -> Sample:
     """Keep of every cell of a cubic grid with about n occupied cells the point nearest to the mean of its points."""
     grid = _grid(*_reach([points]))
     code = grid.codes(points, FINEST_CELLS)
-    order = sort_within(points, code, np.argsort(code, kind="stable"))
+    order = sort_within(points, code, np.argsort(code))
     cells = cells_along(code[order], MORTON_BITS, n)
     if cells == FINEST_CELLS:
         return everybody(points)

@@ -167,7 +167,7 @@ def on_sample(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skele
     others = np.flatnonzero(others)
     others = others[morton_order(skeleton.points[others])]  # the tree is quicker with what is near in turn
     owner[others] = made.vertex_of_point[cKDTree(points).query(skeleton.points[others])[1]]
-    return replace(made, points=skeleton.points, normals=skeleton.normals, vertex_of_point=owner)
+    return with_fields(made, points=skeleton.points, normals=skeleton.normals, vertex_of_point=owner)
 
 
 def in_order(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skeleton:

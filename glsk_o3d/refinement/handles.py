@@ -19,7 +19,7 @@ from .limbs import AXIS_LEAVES, AXIS_LENGTH, Line
 from .sections import SURFACE_FIT, Sections, VertexPoints, half_axes, measure_sections, normal_moments
 from .wide_ends import WIDE_NECK, half_widths
 
-HANDLE_STEP = 0.5  # precision: radii from one section to the next; with .3 and .7 the scores are the same
+HANDLE_STEP = 0.7  # precision: radii from one section to the next; with .3 and .5 the scores are the same
 HANDLE_OPEN = 2 / np.pi  # derived: length of the mean outward normal of half a tube; of more, nothing closes around it
 FLAT_BODY = 1e-6  # precision: of a body's squared half width, so that its ellipsoid can be inverted if it is flat
 HANDLE_POINTS = 4  # derived: fewer say nothing of a section
@@ -191,12 +191,11 @@ class Handles:
                 step = np.linalg.solve(pull + stay, (weight * dot(planes, offset)) @ planes)
                 centre = centre + step - (step @ turn) * turn
                 turned = unit((turned + turn)[None])[0]
-                moments = weight @ normal_moments(normals, points - centre)
-                across = half_axes(moments[None], np.array([radius])).across[0]
             outward = np.linalg.norm(np.copysign(weight, height) @ normals)
             if np.count_nonzero(weight) < HANDLE_POINTS or outward > HANDLE_OPEN * weight.sum():
                 break
             found.append(centre)
             way = turned
+            across = half_axes((weight @ normal_moments(normals, offset))[None], np.array([radius])).across[0]
         # half a ring hardly says where it leads: the last places do
         return np.array(found), unit((found[-1] - found[max(len(found) - 3, 0)])[None])[0]

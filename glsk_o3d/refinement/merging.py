@@ -101,36 +101,41 @@ def collapse_triangles(skeleton: Skeleton, by_degree: bool = False) -> Skeleton:
         around[a].add(b)
         around[b].add(a)
 
-    def cost(a: int, b: int) -> tuple[float, float]:
+    def priced(a: int, b: int) -> tuple[float, float, int, int]:
         degree = (len(around[a]) + len(around[b])) / 2 if by_degree else 0.0
-        return degree, math.dist(position[a], position[b])
+        return degree, math.dist(position[a], position[b]), a, b
 
-    queue = [(*cost(a, b), a, b) for a, b in skeleton.edges.tolist() if not around[a].isdisjoint(around[b])]
+    queue = [priced(a, b) for a, b in skeleton.edges.tolist() if not around[a].isdisjoint(around[b])]
     heapq.heapify(queue)
     representative = list(range(len(position)))
     while queue:
-        *priced, a, b = heapq.heappop(queue)
+        cheapest = heapq.heappop(queue)
+        a, b = cheapest[2:]
         if b not in around[a] or around[a].isdisjoint(around[b]):
             continue
-        if tuple(priced) != cost(a, b):
-            heapq.heappush(queue, (*cost(a, b), a, b))
+        price = priced(a, b)
+        if cheapest != price:
+            heapq.heappush(queue, price)
             continue
         representative[b] = a
         both = weight[a] + weight[b]
         position[a] = [(weight[a] * x + weight[b] * y) / both for x, y in zip(position[a], position[b], strict=True)]
         weight[a] = both
+        fresh = around[b] - around[a]
         for c in around[b]:
             around[c].discard(b)
             if c != a:
                 around[c].add(a)
                 around[a].add(c)
         around[b].clear()
-        # Edges at the merged vertex have other lengths, and those across from it may be on new triangles, or have ends
-        # of less degree: price all that may have become cheaper.
-        for c in around[a]:
-            for d in around[c] if by_degree else around[c] & around[a]:
-                if not around[c].isdisjoint(around[d]):
-                    heapq.heappush(queue, (*cost(*sorted((c, d))), *sorted((c, d))))
-            if not around[a].isdisjoint(around[c]):
-                heapq.heappush(queue, (*cost(*sorted((a, c))), *sorted((a, c))))
+        # Edges at the merged vertex have another length, those at its neighbours another degree, and those between its
+        # neighbours are on new triangles: price all that may have become cheaper.
+        if by_degree:
+            changed = [(c, d) for c in {a, *around[a]} for d in around[c]]
+        else:
+            across = [(c, d) for c in fresh & around[a] for d in around[c] & around[a]]
+            changed = [(min(pair), max(pair)) for pair in [*across, *((a, c) for c in around[a])]]
+        for c, d in changed:
+            if not around[c].isdisjoint(around[d]):
+                heapq.heappush(queue, priced(c, d))
     return merge_vertices(skeleton, final_representatives(np.array(representative, int)))
