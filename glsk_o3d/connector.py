@@ -75,7 +75,7 @@ class Connector(Filter[Skeleton]):
         vertex_of_point = np.where(survivor >= 0, vertex_of_survivor[survivor], -1)
         normals = np.full_like(state.points, np.nan)
         normals[state.sampled] = state.normals[state.representative_of_point[state.sampled]]
-        return Skeleton(
+        made = Skeleton(
             vertices=vertices,
             edges=self._edges(state, vertex_of_survivor),
             radii=plane_distance_radii(vertices, vertex_of_point, state.points, normals),
@@ -84,6 +84,8 @@ class Connector(Filter[Skeleton]):
             normals=normals,
             report=state.report,
         )
+        vars(made).update(surface_points=state.surface_points)
+        return made
 
     def _edges(self, state: Contraction, vertex_of_survivor: np.ndarray) -> np.ndarray:
         rings = state.rings

@@ -67,10 +67,15 @@ class Representatives:
     @property
     def point_of_survivor(self) -> np.ndarray:
         """For every survivor the first input point that it is, (n,) int array."""
+        return self._point_of_row[self.survivors]
+
+    @property
+    def _point_of_row(self) -> np.ndarray:
+        """For every distinct point the first input point that it is, (m,) int array."""
         points = np.flatnonzero(self.sampled)[::-1]  # of several writes the last one stays
         first = np.empty(len(self.cloud), int)
         first[self.representative_of_point[points]] = points
-        return first[self.survivors]
+        return first
 
     def merged_into(self: Some, representative: np.ndarray, **changes: Any) -> Some:
         """The same with survivors merged into others, each into the `representative` (n,) of it; a survivor is its own.

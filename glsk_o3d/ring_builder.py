@@ -87,7 +87,8 @@ class RingBuilder(Filter[Contraction]):
             noise=float(points.noise.mean()),
         )
         mass = np.bincount(points.representative, points.merged) * (n / points.merged.sum())
-        return Contraction(**(points.common() | dict(report=report, mass=mass) | at_rest(cloud, rings)))
+        known = dict(report=report, mass=mass, thinned=points.survivors)
+        return Contraction(**(points.common() | known | at_rest(cloud, rings)))
 
     def _neighbourhoods(self, points: Points, cloud: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The neighbours of every point but itself, (n, k - 1), and the unit normals of their planes, (n, 3)."""

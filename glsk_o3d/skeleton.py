@@ -134,6 +134,11 @@ class Skeleton:
         """Input points with a vertex and a normal, which determine the skeleton, int array."""
         return supporting_points(self.vertex_of_point, self.normals)
 
+    @cached_property
+    def surface_points(self) -> np.ndarray:
+        """Those of these that tell where the surface is, int array: all, unless a Connector knows better."""
+        return self.supporting_points
+
     @property
     def leaves(self) -> np.ndarray:
         """Vertices with one edge, int array."""

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from .numerics.rings import Rings
+from .numerics.vectors import Ints
 from .points import Representatives
 
 
@@ -48,6 +49,8 @@ class Contraction(Representatives):
         psi: a(t-1) - a(t), the drop of the ring ratio in the last solve; a(1) after the first, 0 before it.
     mean_ring_edge, contraction_weight : float
         Mean over the points of the mean ring edge of the uncontracted cloud, and w_L of the last solve, 0 before it.
+    thinned : (r,) int array
+        The rows of `cloud` that have had a ring, survivors and those merged since.
 
     Examples
     --------
@@ -68,6 +71,7 @@ class Contraction(Representatives):
     ring_ratio_drop: float
     mean_ring_edge: float
     contraction_weight: float
+    thinned: Ints
 
     def __repr__(self) -> str:
         return f"Contraction({len(self)} of {len(self.points)} points left after {len(self.report.iterations)} solves)"
@@ -76,6 +80,16 @@ class Contraction(Representatives):
     def contracted(self) -> np.ndarray:
         """Contracted positions of the survivors in the user's units, (n, 3) float64 array."""
         return self.frame.out_of(self.positions)
+
+    @property
+    def surface_points(self) -> Ints:
+        """Input points that tell where the surface is, (s,) int array.
+
+        One of every place that had a ring, since these are evenly apart, and all noisy ones, since it is their mean.
+        """
+        some = self.sampled & (self._of_points(self.noise > 0) > 0)
+        some[self._point_of_row[self.thinned]] = True
+        return np.flatnonzero(some)
 
     @property
     def ring_ratio(self) -> float:

@@ -74,3 +74,24 @@ def test_balls_of_one_radius_cover_and_keep_apart():
             assert cdist(own, own).max() <= 2 * radius
     assert sizes == sorted(sizes, reverse=True)
     assert sizes[0] > 3 * sizes[-1]
+
+
+def test_surface_is_told_by_what_had_a_ring_and_by_noise():
+    """Of a dense clean part the points that the thinner left, even if they were merged since, of noise all."""
+    rng = np.random.default_rng(0)
+    clean, noisy = samples.tube(n=6000).points, samples.tube(n=1500).points + [0, 0, 3]
+    points = np.concatenate([clean, noisy + rng.normal(scale=0.04, size=noisy.shape)])
+    begun = pipelines.rings()(points)
+    assert (begun.noise[begun.representative_of_point[6000:]] > 0).mean() > 0.9
+    state = Contractor(reducer=LPRReducer(), max_iterations=3)(begun)
+    assert len(state) < len(begun)
+    told = Connector()(state).surface_points
+    spoilt = np.flatnonzero(begun.sampled & (begun.noise[begun.representative_of_point] > 0))
+    np.testing.assert_array_equal(told, np.union1d(begun.point_of_survivor, spoilt))
+    assert (told < 6000).sum() < 4000 < 6000
+    assert np.isin(told, Connector()(state).supporting_points).all()
+
+
+def test_every_point_tells_of_the_surface_where_none_is_thinned():
+    skeleton = pipelines.wen2024()(samples.torus(n=3000).points)
+    np.testing.assert_array_equal(skeleton.surface_points, np.arange(3000))

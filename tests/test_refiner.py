@@ -10,7 +10,20 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 import glsk_o3d as glsk
-from glsk_o3d import Decision, Pipeline, Refiner, Report, Skeleton, SkeletonWarning, Tracer, pipelines, refiner, samples
+from glsk_o3d import (
+    Connector,
+    Contractor,
+    Decision,
+    Pipeline,
+    Refiner,
+    Report,
+    Skeleton,
+    SkeletonWarning,
+    Tracer,
+    pipelines,
+    refiner,
+    samples,
+)
 
 PUBLISHED = pipelines.cao2010().stages[-1]
 
@@ -163,3 +176,21 @@ def test_the_only_branch_may_go():
     skeleton = Skeleton([[-1, 0, 0], [1, 0, 0]], [(0, 1)], [0.1, 0.1], np.arange(len(points)) % 2, points, normals)
     with pytest.warns(SkeletonWarning):
         assert len(Refiner(air=1e-12, spacing=0)(skeleton).edges) == 0
+
+
+def test_points_that_do_not_tell_of_the_surface_have_no_say():
+    """They belong to the vertex of the nearest one that does."""
+    raw = (pipelines.rings() | Contractor() | Connector())(samples.y_junction(n=6000).points)
+    told = raw.surface_points
+    rest = np.setdiff1d(np.arange(6000), told)
+    assert len(rest) > 1000
+    points = raw.points.copy()
+    points[rest] += 0.01
+    spoilt = replace(raw, points=points)
+    vars(spoilt).update(surface_points=told)
+    found, other = Refiner()(raw), Refiner()(spoilt)
+    for name in ("vertices", "edges", "radii"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(other, name))
+    nearest = told[cKDTree(raw.points[told]).query(raw.points[rest])[1]]
+    np.testing.assert_array_equal(found.vertex_of_point[rest], found.vertex_of_point[nearest])
+    np.testing.assert_array_equal(found.normals, raw.normals)
