@@ -70,7 +70,11 @@ NAMES = {
         "Fewer vertices": ("simplify",),
         "Another root": ("reroot",),
     },
-    "batch": {"Running": ("run_batch", "BatchResult"), "Looking before": ("plan_batch", "Plan")},
+    "batch": {
+        "Running": ("run_batch", "BatchResult"),
+        "Looking before": ("plan_batch", "Plan"),
+        "As they come": ("Skeletonizer",),
+    },
     "crosscheck": {"The check": ("cross_check", "CrossCheck")},
     "samples": {
         "By name, and what they hold": ("sample_object", "Sample"),
