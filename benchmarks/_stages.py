@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+import time
+import warnings
 from collections.abc import Callable, Iterable
 from functools import partial
 from itertools import product
@@ -30,8 +32,11 @@ from _stopwatch import (
     yardstick,
 )
 from _tables import INK, Tables, good, keep, look, number, pick, plain_log, sheet, short
+from glsk_bench.scanning import CAMERA_DISTANCE, depth_image
+from glsk_bench.shapes import shape
 
-from glsk_o3d import Pipeline
+from glsk_o3d import Pipeline, SkeletonWarning, skeletonize
+from glsk_o3d.batch import Skeletonizer
 from glsk_o3d.numerics.cores import cores
 
 MIDDLE = (4096, 65536)  # sizes of the second growth exponent
@@ -207,6 +212,54 @@ def rate_tables(rows: list[dict]) -> Tables:
         times = (short(1000 * row[key]) for key in keys)
         lines.append([row["pipeline"], str(row["n"]), str(row["threads"]), *times, *rates, ""])
     return [("skeletons per second, wall time", header, lines)]
+
+
+FRAMES, TURN = 30, 60.0  # of a camera, and the degrees that it turns by around the scene meanwhile
+CAMERA_HEIGHT = 20.0  # degrees
+
+
+def frames(family: str, seed: int, n: int) -> list[np.ndarray]:
+    """What a depth camera that turns around a random shape sees, n points a frame."""
+    scene, rng = shape(family, seed), np.random.default_rng(seed)
+    around, above = np.radians(np.linspace(0, TURN, FRAMES)), np.radians(CAMERA_HEIGHT)
+    level = np.cos(above)
+    eyes = CAMERA_DISTANCE * np.column_stack(
+        [level * np.cos(around), level * np.sin(around), np.full(FRAMES, np.sin(above))]
+    )
+    return [depth_image(scene, eye, n, rng) for eye in eyes]
+
+
+def measure_stream(sizes: list[int], families: list[str], repeat: int) -> list[dict]:
+    """A row for each size, family and number of workers: frames per second, once all processes have begun."""
+    warnings.simplefilter("ignore", SkeletonWarning)
+    rows = []
+    for n, family in product(sizes, families):
+        seen = frames(family, 0, n)
+        knn = in_turns({"1 kNN": partial(yardstick, seen[0])}, repeat)["1 kNN"][1]["wall"]
+        expected = [skeletonize(frame).vertices for frame in seen]
+        for workers in sorted({1, cores()}):
+            spent = []
+            with Skeletonizer(workers=workers) as skeletonizer:
+                list(skeletonizer.stream(seen[: 2 * workers]))
+                for _ in range(repeat):
+                    start = time.perf_counter()
+                    found = [skeleton.vertices for skeleton in skeletonizer.stream(seen)]
+                    spent.append((time.perf_counter() - start) / FRAMES)
+            same = all(np.array_equal(one, other) for one, other in zip(found, expected, strict=True))
+            facts = dict(measure="stream", n=n, shape=family, workers=workers, same=same)
+            rows.append(facts | dict(knn_wall=knn, wall=median(spent), least=min(spent), most=max(spent)))
+    return rows
+
+
+def stream_tables(rows: list[dict]) -> Tables:
+    """Frames per second of streams."""
+    header = ["scene", "points", "workers", "1 kNN ms", "a frame ms", "frames per second", "least", "most", "same bits"]
+    lines = []
+    for row in rows:
+        rates = [number(1 / row[key], 1) for key in ("wall", "most", "least")]
+        times = (short(1000 * row[key]) for key in ("knn_wall", "wall"))
+        lines.append([row["shape"], str(row["n"]), str(row["workers"]), *times, *rates, "yes" if row["same"] else "no"])
+    return [(f"streams of {FRAMES} depth frames, wall time", header, lines)]
 
 
 def draw_growth(tables: Tables, folder: Path) -> None:

@@ -19,7 +19,16 @@ from _clouds import BUILTIN
 from _figures import draw_figures, figure_tables, measure_figures, measure_scans, objects, scan_tables
 from _large import huge_tables, large_tables, measure_huge, measure_large
 from _runs import Folder, Jobs, Markdown, Output, Own, Pipelines, Shapes, application, named
-from _stages import draw_growth, draw_shares, measure_rate, measure_stages, rate_tables, stage_tables
+from _stages import (
+    draw_growth,
+    draw_shares,
+    measure_rate,
+    measure_stages,
+    measure_stream,
+    rate_tables,
+    stage_tables,
+    stream_tables,
+)
 from _tables import fill, machine, page_with, present, publish, save
 
 app = application(__doc__)
@@ -106,6 +115,26 @@ def rate(
         raise typer.BadParameter(f"no shape {shape}: there are {', '.join(BUILTIN)}")
     rows = measure_rate(numbers(sizes), pipeline.split(","), shape, repeat, jobs)
     publish(rows, rate_tables, output, markdown, machine())
+
+
+@app.command()
+def stream(
+    page: Annotated[
+        Path | None,
+        typer.Argument(metavar="PAGE", help="Markdown page to put the table into.", callback=page_with("stream")),
+    ] = None,
+    sizes: Sizes = "1024,4096,16384",
+    scenes: Annotated[
+        str, typer.Option("--scenes", metavar="NAMES", help="Families of random shapes.")
+    ] = "figures,handles",
+    repeat: Repeat = 3,
+    output: Output = None,
+    markdown: Markdown = False,
+) -> None:
+    """Thirty frames of a depth camera that turns around a scene, by one process and by one for each core."""
+    where = machine()
+    rows = measure_stream(numbers(sizes), scenes.split(","), repeat)
+    publish(rows, stream_tables, output, markdown, where, page, "stream")
 
 
 @app.command()

@@ -72,6 +72,16 @@ class TestCommands:
         for row in rates:
             assert 0 < row["import_wall"] + row["first_wall"] < row["process_wall"]
 
+    def test_stream(self, call, parts, tmp_path, monkeypatch):
+        monkeypatch.setattr(parts.stages, "FRAMES", 3)
+        page, out = tmp_path / "speed.md", tmp_path / "out.json"
+        page.write_text("<!-- stream -->\nold\n<!-- end -->\n")
+        call("stream", page, "--sizes", "400", "--scenes", "handles", "--repeat", 1, "-o", out)
+        rows = json.loads(out.read_text())["rows"]
+        assert [row["workers"] for row in rows] == sorted({1, cores()})
+        assert all(row["same"] and 0 < row["least"] <= row["wall"] <= row["most"] for row in rows)
+        assert "| handles | 400 | 1 |" in page.read_text()
+
     def test_large(self, call, tmp_path):
         page, out = tmp_path / "speed.md", tmp_path / "out.json"
         page.write_text("before\n<!-- large -->\nold\n<!-- end -->\nafter\n")

@@ -8,7 +8,7 @@ import numpy as np
 from .frame import check_extent
 from .groups import group_sum
 from .morton import FINEST_CELLS, MORTON_BITS, morton_codes, sort_within
-from .vectors import dot
+from .vectors import box, dot
 
 GRID_TAIL = 0.001  # fitted: share of the points that may be far off, at either end of each axis
 SAMPLED_POINTS = 100_000  # measured: points by which that is told, and parts traced; with fewer, thick ones look thin
@@ -57,7 +57,8 @@ def _reach(blocks: Iterable[np.ndarray]) -> tuple[int, np.ndarray, np.ndarray]:
     n, low, high = 0, np.full(3, np.inf), np.full(3, -np.inf)
     some, mixed, share = np.empty((0, 3)), np.empty(0, np.uint64), np.uint64(0)
     for points in blocks:
-        n, low, high = n + len(points), np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
+        least, most = box(points)
+        n, low, high = n + len(points), np.minimum(low, least), np.maximum(high, most)
         numbers = _mixed(points)
         few = numbers & share == 0
         some, mixed = np.concatenate([some, points[few]]), np.concatenate([mixed, numbers[few]])

@@ -38,6 +38,9 @@ def unit(a: Floats) -> Floats:
 
 def finite_rows(a: np.ndarray) -> np.ndarray:
     """Which rows of `a`, (n, 3) float array, have no other numbers than finite ones, (n,) bool array."""
+    with np.errstate(all="ignore"):
+        if np.isfinite(a.sum()):  # mostly all have, and this tells it ten times faster
+            return np.ones(len(a), bool)
     return np.isfinite(np.ascontiguousarray(a.T)).all(axis=0)
 
 
