@@ -85,9 +85,10 @@ class Contraction(Representatives):
     def surface_points(self) -> Ints:
         """Input points that tell where the surface is, (s,) int array.
 
-        One of every place that had a ring, since these are evenly apart, and all noisy ones, since it is their mean.
+        One of every place that had a ring, since these are evenly apart; and all where there is noise, or was before
+        they were averaged, since it is their mean.
         """
-        some = self.sampled & (self._of_points(self.noise > 0) > 0)
+        some = self.sampled & (self._of_points((self.noise > 0) | (self.merged > 1)) > 0)
         some[self._point_of_row[self.thinned]] = True
         return np.flatnonzero(some)
 
