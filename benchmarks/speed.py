@@ -123,7 +123,7 @@ def stream(
         Path | None,
         typer.Argument(metavar="PAGE", help="Markdown page to put the table into.", callback=page_with("stream")),
     ] = None,
-    sizes: Sizes = "1024,4096,16384",
+    sizes: Sizes = "1024,4096",
     scenes: Annotated[
         str, typer.Option("--scenes", metavar="NAMES", help="Families of random shapes.")
     ] = "figures,handles",
