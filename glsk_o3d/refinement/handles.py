@@ -83,7 +83,7 @@ class Handles:
             if apart > STUB_LENGTH * wide[top] or not len(own):
                 continue
             away = norm(vertices[body] - self.cloud.points[own].mean(axis=0))
-            if away.min() < wide[top] / 2 and self._on_loop(branch):  # or the middle is that of a thick ring
+            if away.min() < wide[top] / 2 and self.on_loop(branch):  # or the middle is that of a thick ring
                 found.append(body[away.argmin()])
         return np.array(found, int)
 
@@ -110,7 +110,7 @@ class Handles:
         looped = edges_on_cycles(len(self._width), edges, np.maximum(self.skeleton.edge_lengths, TINY))
         return {(a, b) for i, j in edges[looped].tolist() for a, b in ((i, j), (j, i))}
 
-    def _on_loop(self, path: np.ndarray) -> bool:
+    def on_loop(self, path: np.ndarray) -> bool:
         """Whether a branch, or a part of one, is on a loop: with its first edge, all are."""
         return tuple(path[:2].tolist()) in self._looped
 
@@ -128,7 +128,7 @@ class Handles:
         radius = quantile(self._sections.radius[path[run]]) if len(run) else 0.0
         size = np.maximum(self._sections.radius, cloud.distance)[path[run]]
         run = run[size < AXIS_LEAVES * radius]
-        if len(run) < HANDLE_POINTS or not self._on_loop(path):
+        if len(run) < HANDLE_POINTS or not self.on_loop(path):
             return None
         along = arc_lengths(places)
         half_width, half_thickness = (quantile(half[path[run]]) for half in self._sections[:2])

@@ -64,7 +64,7 @@ def move_junctions(skeleton: Skeleton) -> Skeleton:
     handles = Handles(skeleton)
     if handles.some:
         limbs = Limbs(skeleton, handles.bodies)
-        places = _places(skeleton, limbs, {}, handles)
+        places = _places(skeleton, limbs, known, handles)
     return _straightened(skeleton, limbs, places)
 
 
@@ -76,12 +76,13 @@ def _places(
     low, high = axis_box(cloud.points if len(cloud.points) else skeleton.vertices)
     found = {}
     for junction in sorted(limbs.at):
-        name = limbs.signature(junction)
-        if name in known:
+        name, here = limbs.signature(junction), limbs.at[junction]
+        looped = handles is not None and any(handles.on_loop(limbs.paths[limb]) for limb in here)
+        if name in known and not looped:
             found[junction] = known[name]
             continue
-        here, lines, radius, around = limbs.at[junction], [], 0.0, []
-        body = handles.body([limbs.paths[limb] for limb in here]) if handles else None
+        lines, radius, around = [], 0.0, []
+        body = handles.body([limbs.paths[limb] for limb in here]) if handles and looped else None
         for limb in here:
             path, along = limbs.paths[limb], arc_lengths(limbs.vertices[limbs.paths[limb]])
             others = [limbs.paths[k] for k in here if limbs.branch[k] != limbs.branch[limb]]
