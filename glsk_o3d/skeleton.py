@@ -136,7 +136,7 @@ class Skeleton:
 
     @cached_property
     def surface_points(self) -> np.ndarray:
-        """Those of these that tell where the surface is, int array: all, unless a Connector knows better."""
+        """Supporting points that tell where the surface is, int array: all of them, unless a Connector knows better."""
         return self.supporting_points
 
     @property

@@ -51,7 +51,7 @@ class TestArithmetic:
 class TestCommands:
     def test_all_fill_a_page(self, call, tmp_path, root):
         page, out = tmp_path / "speed.md", tmp_path / "out.json"
-        page.write_text((root / "docs" / "speed.md").read_text().partition("## Clouds as scanners")[0])
+        page.write_text((root / "docs" / "speed.md").read_text().partition("## Streams")[0])
         (tmp_path / "images").mkdir()
         words = ("--sizes", "256,512", "--figure-sizes", "256", "--published-to", 256, "--shapes", "tube")
         printed = call("all", page, "--builtin", *words, "--repeat", 1, "--jobs", 0, "--markdown", "-o", out)
