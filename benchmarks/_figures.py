@@ -36,7 +36,7 @@ RULES: dict[str, list[str]] = {
 CLAIMS = {1024: "about 1", 4096: "about 0.5", 16384: "less still"}
 """What Wen et al. 2024 find for the cost of their contraction over that of the baseline, figures 4 to 6."""
 NOISE = ("noise0.1", "noise0.3", "noise1")  # of the bodies, in percent of the diagonal
-VIEWS = ("clean", "depth2", "misreg", "lidar")
+VIEWS = ("clean", "depth2", "misreg", "lidar")  # of the shapes of folders
 OBJECTS = "scanned objects"
 TWO = {"OMP_NUM_THREADS": "2"}  # the package asks at every call
 

@@ -136,7 +136,10 @@ class Skeleton:
 
     @cached_property
     def surface_points(self) -> np.ndarray:
-        """Supporting points that tell where the surface is, int array: all of them, unless a Connector knows better."""
+        """Supporting points by which a Refiner is to know the surface, int array.
+
+        Those of `Contraction.surface_points` if a Connector has just made it, and all once it was changed.
+        """
         return self.supporting_points
 
     @property

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.distance import cdist
 
-from glsk_o3d import Connector, Contractor, LPRReducer, RingBuilder, Sampler, Skeleton, pipelines, samples
+from glsk_o3d import Connector, Contractor, LPRReducer, Pipeline, RingBuilder, Sampler, Skeleton, pipelines, samples
 
 VARIANTS = {
     name: next(stage for stage in make().stages if isinstance(stage, Connector))
@@ -93,5 +93,6 @@ def test_surface_is_told_by_what_had_a_ring_and_by_noise():
 
 
 def test_every_point_tells_of_the_surface_where_none_is_thinned():
-    skeleton = pipelines.wen2024()(samples.torus(n=3000).points)
+    skeleton = Pipeline(*pipelines.wen2024().stages[:-1])(samples.torus(n=3000).points)
+    assert "surface_points" in vars(skeleton)
     np.testing.assert_array_equal(skeleton.surface_points, np.arange(3000))

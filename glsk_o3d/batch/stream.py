@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Iterator
-from concurrent.futures import BrokenExecutor, Future
+from concurrent.futures import BrokenExecutor, CancelledError, Future
 from typing import Any
-
-import numpy as np
 
 from ..driver import PipelineChoice, chosen_pipeline
 from ..errors import BatchError
-from ..interop.clouds import cloud_points
+from ..interop.clouds import cloud_points, open3d_class
 from ..parameters import check_number
 from ..pipeline import Pipeline
 from ..recipes import from_recipe, to_recipe
@@ -31,7 +29,8 @@ class Skeletonizer:
     pipeline : as of `glsk_o3d.skeletonize`
         With several workers every filter must be one that a recipe can hold.
     workers : int
-        Processes. They start with the first cloud, which takes a second or two; 1 starts none.
+        Processes. They start with the first cloud, which takes a second or two; 1 starts none. In a script, several
+        must begin under ``if __name__ == "__main__"``, since every one imports it.
     **options
         Parameters of the filters, by name.
 
@@ -63,15 +62,15 @@ class Skeletonizer:
         self.close()
 
     def close(self) -> None:
-        """End the processes; a later stream starts others."""
+        """End the processes, and with them what streams have not given yet; a later stream starts others."""
         self._pool.close(at_once=True)
         self._pool = LocalWorkers(self._count)
 
     def stream(self, clouds: Iterable[Any]) -> Iterator[Skeleton]:
-        """Skeletons of some clouds, each as soon as it and all before it are there.
+        """Skeletons of some clouds, in their order.
 
-        As many clouds are taken ahead as there are workers, so that one that is waited for, such as the next frame of a
-        camera, holds back the skeletons of those before it.
+        With several workers, as many clouds are taken ahead, so that the skeleton of a camera's frame is given when so
+        many more frames have come. Other processes see the points and, of a tensor cloud, its attributes.
 
         Parameters
         ----------
@@ -80,25 +79,43 @@ class Skeletonizer:
         Raises
         ------
         InvalidCloudError
-            Where a cloud cannot be skeletonised; the skeletons before it were given.
+            Where a cloud cannot be skeletonised. The skeletons before it were given; clouds taken ahead are lost.
         BatchError
-            A process died.
+            A process died, or the Skeletonizer was closed.
         """
-        waiting = deque[Future[Skeleton]]()
-        for cloud in clouds:
-            if self._count == 1:
-                yield self.pipeline(cloud)
-                continue
-            waiting.append(self._pool.submit(_skeletonized, self._recipe, cloud_points(cloud)))
-            if len(waiting) > self._count:
+        if self._count == 1:
+            yield from map(self.pipeline, clouds)
+            return
+        waiting, taken, problem = deque[Future[Skeleton]](), iter(clouds), None
+        try:
+            while problem is None:
+                try:
+                    sent = _sent(next(taken))
+                except StopIteration:
+                    break
+                except Exception as error:  # of a cloud, or of what gives them: after what is underway
+                    problem = error
+                    break
+                waiting.append(self._pool.submit(_skeletonized, self._recipe, sent))
+                if len(waiting) > self._count:
+                    yield _told(waiting.popleft())
+            while waiting:
                 yield _told(waiting.popleft())
-        while waiting:
-            yield _told(waiting.popleft())
+        finally:
+            for future in waiting:
+                future.cancel()
+        if problem is not None:
+            raise problem
 
 
-def _skeletonized(recipe: dict[str, Any], points: np.ndarray) -> Skeleton:
+def _sent(cloud: Any) -> Any:
+    """What another process is sent of a cloud: Open3D's others than tensor clouds cannot be."""
+    return cloud if open3d_class(cloud) == ("PointCloud", True) else cloud_points(cloud)
+
+
+def _skeletonized(recipe: dict[str, Any], cloud: Any) -> Skeleton:
     """A skeleton, in another process."""
-    skeleton: Skeleton = from_recipe(recipe)(points)
+    skeleton: Skeleton = from_recipe(recipe)(cloud)
     return skeleton
 
 
@@ -106,7 +123,8 @@ def _told(future: Future[Skeleton]) -> Skeleton:
     """What another process has made, with the warnings that nobody heard there."""
     try:
         skeleton = future.result()
-    except BrokenExecutor as error:
-        raise BatchError("a process that skeletonises the stream died, perhaps for want of memory") from error
+    except (BrokenExecutor, CancelledError) as error:
+        told = "a process that skeletonises the stream died, perhaps for want of memory, or the Skeletonizer was closed"
+        raise BatchError(told) from error
     warn(skeleton.report.warnings)
     return skeleton

@@ -49,7 +49,7 @@ class LocalWorkers:
                 self._pool.submit(os.getpid).result()
             except BrokenExecutor as error:
                 raise BatchError(
-                    "worker processes die before they begin; stderr may say why. In a script, call run_batch under "
+                    "worker processes die before they begin; stderr may say why. In a script, start them under "
                     'if __name__ == "__main__": every worker runs the rest of it too'
                 ) from error
             return self._pool.submit(function, *arguments)

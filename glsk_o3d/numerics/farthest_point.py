@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .vectors import dot
+from .vectors import TINY, dot
 
 FEW_POINTS = 16384  # speed: as many distances are measured sooner than points nearby are looked up
 
@@ -17,7 +17,7 @@ def farthest_point_sampling(points: np.ndarray, radius: np.ndarray) -> tuple[np.
     sample nearest to it, (n,).
     """
     x, nearest = np.ascontiguousarray(points.T), np.full(len(points), np.inf)
-    representative, scale = np.zeros(len(points), int), 1 / radius**2
+    representative, scale = np.zeros(len(points), int), 1 / np.maximum(radius**2, TINY)
     tree = cKDTree(points) if len(points) > FEW_POINTS else None
     away = points - points.mean(axis=0)
     sample = int(np.argmax(dot(away, away)))

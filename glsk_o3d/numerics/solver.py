@@ -66,9 +66,8 @@ def solve_contraction(
     X)`, brings the correction below 1e-7 in one to three steps.
 
     The weights (n,) are the diagonals of :math:`W_L` and :math:`W_H`; `position_weight` must be positive. The order of
-    the unknowns is kept in the `elimination`. Returns the
-    places (n, 3) and the last correction over the cloud's size, an estimate of the error; SolveError if the
-    factorisation breaks down or the estimate stays above 1e-4.
+    the unknowns is kept in the `elimination`. Returns the places (n, 3) and the last correction over the cloud's size,
+    an estimate of the error; SolveError if the factorisation breaks down or the estimate stays above 1e-4.
     """
     elimination = elimination or Elimination()
     place = np.arange(len(points)) if elimination.place is None else elimination.place

@@ -23,9 +23,9 @@ from .merging import with_fields
 # fitted: winding number below which an axis is in little; .5 on that of a tube seen from one side, .2 in sparse crowns
 LEAST_INSIDE = 0.4
 
+REFINED_POINTS = 16384  # measured: points without noise that a graph is refined by: of 65536 it takes half of the time
 # measured: points of one object beyond which a surface hangs together in the same way, and noisy ones down to about
 ENOUGH_POINTS = 4096  # which they are averaged
-REFINED_POINTS = 16384  # measured: points without noise that a graph is refined by: of 65536 it takes half of the time
 VERTEX_POINTS = 32  # derived: points to a vertex of a tube with 20 around it, whose vertices are half a radius apart
 
 

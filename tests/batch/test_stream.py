@@ -3,6 +3,7 @@
 import os
 
 import numpy as np
+import open3d as o3d
 import pytest
 
 from glsk_o3d import InvalidCloudError, InvalidParameterError, SkeletonWarning, errors, samples, skeletonize
@@ -49,6 +50,39 @@ def test_what_goes_wrong_is_raised_after_what_went_right(frames):
             next(found)
         (again,) = skeletonizer.stream(frames[1:2])
         same(again, skeletonize(frames[1]))
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_what_cannot_be_sent_is_raised_after_what_went_right_too(frames, workers):
+    def camera():
+        yield from frames[:2]
+        raise OSError("unplugged")
+
+    with Skeletonizer(workers=workers) as skeletonizer:
+        for clouds, error in (([*frames[:2], np.zeros((50, 2))], InvalidCloudError), (camera(), OSError)):
+            found = skeletonizer.stream(clouds)
+            for frame in frames[:2]:
+                same(next(found), skeletonize(frame))
+            with pytest.raises(error):
+                next(found)
+
+
+def test_counts_of_a_sample_are_sent(frames):
+    sample = o3d.t.geometry.PointCloud(o3d.core.Tensor(frames[0]))
+    sample.point["sample_count"] = o3d.core.Tensor(np.arange(1, 601))
+    with Skeletonizer(workers=2) as skeletonizer:
+        (found,) = skeletonizer.stream([sample])
+    same(found, skeletonize(sample))
+    assert found.report.n_input == 600 * 601 // 2
+
+
+def test_one_that_is_closed_says_so(frames):
+    skeletonizer = Skeletonizer(workers=2)
+    found = skeletonizer.stream(frames)
+    next(found)
+    skeletonizer.close()
+    with pytest.raises(errors.BatchError, match="closed"):
+        list(found)
 
 
 def test_warnings_are_heard():
