@@ -85,10 +85,11 @@ class Contraction(Representatives):
     def surface_points(self) -> Ints:
         """Input points that tell where the surface is, (s,) int array.
 
-        One of every place that had a ring, since these are evenly apart; and all where there is noise, or was before
-        they were averaged, since it is their mean.
+        Those of every place that had a ring, since these are evenly apart; and all where there is noise, or was before
+        they were averaged, since it is their mean. Of copies all, since one would be chosen by chance.
         """
-        some = self.sampled & (self._of_points((self.noise > 0) | (self.merged > 1)) > 0)
+        several = np.bincount(self.representative_of_point[self.sampled], minlength=len(self.cloud)) > 1
+        some = self.sampled & (self._of_points((self.noise > 0) | several) > 0)
         some[self._point_of_row[self.thinned]] = True
         return np.flatnonzero(some)
 

@@ -17,6 +17,8 @@ from ..report import warn
 from ..skeleton import Skeleton
 from .workers import LocalWorkers
 
+CLOSED = "the Skeletonizer was closed before its stream was at an end"
+
 
 class Skeletonizer:
     """Skeletons of clouds as they come, in their order, by several processes at a time.
@@ -62,15 +64,15 @@ class Skeletonizer:
         self.close()
 
     def close(self) -> None:
-        """End the processes, and with them what streams have not given yet; a later stream starts others."""
-        self._pool.close(at_once=True)
-        self._pool = LocalWorkers(self._count)
+        """End the processes when they have done what they do; a later stream starts others."""
+        pool, self._pool = self._pool, LocalWorkers(self._count)
+        pool.close(at_once=False)  # a process that is killed while it sends leaves the other end waiting for ever
 
     def stream(self, clouds: Iterable[Any]) -> Iterator[Skeleton]:
         """Skeletons of some clouds, in their order.
 
-        With several workers, as many clouds are taken ahead, so that the skeleton of a camera's frame is given when so
-        many more frames have come. Other processes see the points and, of a tensor cloud, its attributes.
+        With several workers, as many clouds are taken ahead: each skeleton comes so many clouds late. Other processes
+        see the points and, of a tensor cloud, its attributes.
 
         Parameters
         ----------
@@ -79,14 +81,15 @@ class Skeletonizer:
         Raises
         ------
         InvalidCloudError
-            Where a cloud cannot be skeletonised. The skeletons before it were given; clouds taken ahead are lost.
+            Where a cloud cannot be skeletonised. That ends the stream: the skeletons before it were given, and clouds
+            taken ahead are lost. Another stream may go on with those that follow.
         BatchError
             A process died, or the Skeletonizer was closed.
         """
         if self._count == 1:
             yield from map(self.pipeline, clouds)
             return
-        waiting, taken, problem = deque[Future[Skeleton]](), iter(clouds), None
+        pool, waiting, taken, problem = self._pool, deque[Future[Skeleton]](), iter(clouds), None
         try:
             while problem is None:
                 try:
@@ -96,7 +99,9 @@ class Skeletonizer:
                 except Exception as error:  # of a cloud, or of what gives them: after what is underway
                     problem = error
                     break
-                waiting.append(self._pool.submit(_skeletonized, self._recipe, sent))
+                if pool is not self._pool:
+                    raise BatchError(CLOSED)
+                waiting.append(pool.submit(_skeletonized, self._recipe, sent))
                 if len(waiting) > self._count:
                     yield _told(waiting.popleft())
             while waiting:
@@ -123,8 +128,9 @@ def _told(future: Future[Skeleton]) -> Skeleton:
     """What another process has made, with the warnings that nobody heard there."""
     try:
         skeleton = future.result()
-    except (BrokenExecutor, CancelledError) as error:
-        told = "a process that skeletonises the stream died, perhaps for want of memory, or the Skeletonizer was closed"
-        raise BatchError(told) from error
+    except CancelledError:
+        raise BatchError(CLOSED) from None
+    except BrokenExecutor as error:
+        raise BatchError("a process that skeletonises the stream died, perhaps for want of memory") from error
     warn(skeleton.report.warnings)
     return skeleton
