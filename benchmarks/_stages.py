@@ -32,7 +32,7 @@ from _stopwatch import (
     yardstick,
 )
 from _tables import INK, Tables, good, keep, look, number, pick, plain_log, sheet, short
-from glsk_bench.scanning import CAMERA_DISTANCE, depth_image
+from glsk_bench.scanning import depth_image, places_at
 from glsk_bench.shapes import shape
 
 from glsk_o3d import Pipeline, SkeletonWarning, skeletonize
@@ -222,11 +222,7 @@ CAMERA_HEIGHT = 20.0  # degrees
 def frames(family: str, seed: int, n: int) -> list[np.ndarray]:
     """What a depth camera that turns around a random shape sees, n points a frame."""
     scene, rng = shape(family, seed), np.random.default_rng(seed)
-    around, above = np.radians(np.linspace(0, TURN, FRAMES)), np.radians(CAMERA_HEIGHT)
-    level = np.cos(above)
-    eyes = CAMERA_DISTANCE * np.column_stack(
-        [level * np.cos(around), level * np.sin(around), np.full(FRAMES, np.sin(above))]
-    )
+    eyes = places_at(np.radians(np.linspace(0, TURN, FRAMES)), np.full(FRAMES, np.radians(CAMERA_HEIGHT)))
     return [depth_image(scene, eye, n, rng) for eye in eyes]
 
 

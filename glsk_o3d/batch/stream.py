@@ -91,7 +91,7 @@ class Skeletonizer:
             return
         pool, waiting, taken, problem = self._pool, deque[Future[Skeleton]](), iter(clouds), None
         try:
-            while problem is None:
+            while True:
                 try:
                     sent = _sent(next(taken))
                 except StopIteration:

@@ -44,7 +44,11 @@ def camera_places(rng: np.random.Generator, count: int) -> np.ndarray:
     """Draw places of two or three cameras around a shape and somewhat above it, (count, 3) float array."""
     apart = np.radians(TWO_APART if count == 2 else THREE_APART)
     around = rng.uniform(0, 2 * np.pi) + apart * np.arange(count)
-    above = np.radians(rng.uniform(LOWEST_CAMERA, HIGHEST_CAMERA, count))
+    return places_at(around, np.radians(rng.uniform(LOWEST_CAMERA, HIGHEST_CAMERA, count)))
+
+
+def places_at(around: np.ndarray, above: np.ndarray) -> np.ndarray:
+    """Places of cameras at these angles around and above a shape, (count, 3) float array."""
     level = np.cos(above)
     return CAMERA_DISTANCE * np.column_stack([level * np.cos(around), level * np.sin(around), np.sin(above)])
 
