@@ -84,7 +84,7 @@ class Connector(Filter[Skeleton]):
             normals=normals,
             report=state.report,
         )
-        vars(made).update(surface_points=state.surface_points)
+        vars(made).update(surface_points=state.surface_points, stand_ins=state.stand_ins)
         return made
 
     def _edges(self, state: Contraction, vertex_of_survivor: np.ndarray) -> np.ndarray:

@@ -142,6 +142,14 @@ class Skeleton:
         """
         return self.supporting_points
 
+    @cached_property
+    def stand_ins(self) -> np.ndarray:
+        """Of every input point that of the sample which stands for it, (N,) int array, -1 of dropped ones.
+
+        Those of the `Contraction` if a Connector has just made it, and each for itself once it was changed.
+        """
+        return np.arange(len(self.points))
+
     @property
     def leaves(self) -> np.ndarray:
         """Vertices with one edge, int array."""

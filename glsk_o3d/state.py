@@ -94,6 +94,11 @@ class Contraction(Representatives):
         return np.flatnonzero(some)
 
     @property
+    def stand_ins(self) -> Ints:
+        """For every input point that of the sample which stands for it, (N,) int array; -1 for dropped points."""
+        return self._of_points(self._point_of_row)
+
+    @property
     def ring_ratio(self) -> float:
         """a(t): sum of the ring sizes over that of the uncontracted cloud."""
         return float(self.ring_size.sum() / self.ring_size0.sum())

@@ -194,3 +194,14 @@ def test_points_that_do_not_tell_of_the_surface_have_no_say():
     nearest = told[cKDTree(raw.points[told]).query(raw.points[rest])[1]]
     np.testing.assert_array_equal(found.vertex_of_point[rest], found.vertex_of_point[nearest])
     np.testing.assert_array_equal(found.normals, raw.normals)
+
+
+def test_points_outside_a_sample_have_the_vertex_of_what_stands_for_them():
+    raw = (pipelines.rings() | Contractor() | Connector())(samples.y_junction(n=120_000).points)
+    outside = np.setdiff1d(np.arange(120_000), raw.supporting_points)
+    assert len(outside) > 50_000
+    assert np.isin(raw.stand_ins[outside], raw.supporting_points).all()
+    away = np.linalg.norm(raw.points[outside] - raw.points[raw.stand_ins[outside]], axis=1)
+    assert np.quantile(away, 0.99) < np.median(raw.radii) / 4
+    found = Refiner()(raw)
+    np.testing.assert_array_equal(found.vertex_of_point[outside], found.vertex_of_point[raw.stand_ins[outside]])

@@ -1,6 +1,7 @@
 """A sample that stands for a large cloud: of one in memory, and of one that comes in blocks."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from itertools import pairwise
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -14,6 +15,7 @@ GRID_TAIL = 0.001  # fitted: share of the points that may be far off, at either 
 SAMPLED_POINTS = 100_000  # measured: points by which that is told, and parts traced; with fewer, thick ones look thin
 # derived: odd numbers with bits everywhere, by which coordinates are mixed
 MIXING = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
+GRID_CHUNK = 65536  # speed: points at a time: the work arrays then stay in the cache
 ALL_BITS = np.uint64(2**64 - 1)  # derived
 
 
@@ -46,7 +48,13 @@ class Grid(NamedTuple):
 
     def codes(self, points: np.ndarray, cells: float) -> np.ndarray:
         """Morton codes of the cells of points, (m,) uint64 array, with so many cells along the longest side."""
-        return morton_codes(np.clip(points, self.low, self.high), cells, self.corner, self.extent)
+        clipped = (np.clip(part, self.low, self.high) for part in _chunks(points))
+        return np.concatenate([morton_codes(part, cells, self.corner, self.extent) for part in clipped])
+
+
+def _chunks(points: np.ndarray) -> Iterator[np.ndarray]:
+    """The rows of (m, 3), m > 0, some at a time."""
+    return (points[start : start + GRID_CHUNK] for start in range(0, len(points), GRID_CHUNK))
 
 
 def _reach(blocks: Iterable[np.ndarray]) -> tuple[int, np.ndarray, np.ndarray]:
@@ -106,7 +114,7 @@ def cells_along(codes: np.ndarray, bits: int, n: int) -> float:
 
 def sample_grid(points: np.ndarray, n: int) -> Sample:
     """Keep of every cell of a cubic grid with about n occupied cells the point nearest to the mean of its points."""
-    grid = _grid(*_reach([points]))
+    grid = _grid(*_reach(_chunks(points)))
     code = grid.codes(points, FINEST_CELLS)
     order = sort_within(points, code, np.argsort(code))
     cells = cells_along(code[order], MORTON_BITS, n)
@@ -115,22 +123,32 @@ def sample_grid(points: np.ndarray, n: int) -> Sample:
     code = grid.codes(points, cells)[order]
     again = np.argsort(code, kind="stable")
     order, code = order[again], code[again]
-    begin = _begins(code)
-    size = np.diff(begin, append=len(code))
-    cell = np.repeat(np.arange(len(begin)), size)
-    ordered = points[order]
-    x, y, z = (ordered[1:] != ordered[:-1]).T
-    fresh = np.append(True, x | y | z)  # no copy of the one before
-    weight = np.bincount(cell, fresh)
-    mean = np.add.reduceat(ordered * fresh[:, None], begin) / weight[:, None]
-    away = ordered - np.repeat(mean, size, axis=0)
+    begin = np.append(_begins(code), len(code))
+    kept, weight = np.empty(len(begin) - 1, int), np.empty(len(begin) - 1)
+    parts = np.searchsorted(begin, range(0, len(code) + GRID_CHUNK, GRID_CHUNK)).clip(max=len(kept))
+    for first, last in pairwise(np.unique(parts).tolist()):
+        rows = order[begin[first] : begin[last]]
+        middle, weight[first:last] = _middles(points.take(rows, axis=0), begin[first:last] - begin[first])
+        kept[first:last] = rows[middle]
+    representative = np.empty(len(points), int)
+    representative[order] = np.repeat(np.arange(len(kept)), np.diff(begin))
+    return kept, representative, weight
+
+
+def _middles(points: np.ndarray, begin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The first of the points nearest to the mean of each cell, (c,), and how many are in it, without copies, (c,).
+
+    The points (m, 3) of each cell are together, from the row `begin` (c,) on, and copies one behind the other.
+    """
+    size = np.diff(begin, append=len(points))
+    x, y, z = (points[1:] != points[:-1]).T
+    fresh = np.append(True, x | y | z)
+    weight = np.add.reduceat(fresh, begin, dtype=float)
+    mean = np.add.reduceat(points * fresh[:, None], begin) / weight[:, None]
+    away = points - np.repeat(mean, size, axis=0)
     squared = dot(away, away)
     nearest = np.flatnonzero(squared == np.repeat(np.minimum.reduceat(squared, begin), size))
-    kept = np.empty(len(begin), int)
-    kept[cell[nearest[::-1]]] = order[nearest[::-1]]
-    representative = np.empty(len(points), int)
-    representative[order] = cell
-    return kept, representative, weight
+    return nearest[np.searchsorted(nearest, begin)], weight
 
 
 def _begins(ordered: np.ndarray) -> np.ndarray:
@@ -151,7 +169,7 @@ def sample_blocks(blocks: Blocks, size: Callable[[int], int]) -> tuple[np.ndarra
     the means of the cells, and the points nearest to them; a small one twice. Copies of a point count, unlike those in
     memory.
     """
-    total, ends, some = _reach(blocks())
+    total, ends, some = _reach(part for block in blocks() for part in _chunks(block))
     n = size(total)
     if total <= 2 * n:
         return np.concatenate([np.empty((0, 3)), *blocks()]), np.ones(total, int)
@@ -196,12 +214,16 @@ def _nearest(blocks: Blocks, grid: Grid, cells: float, codes: np.ndarray, means:
     """
     nearest, least = np.zeros(means.shape), np.full(len(means), np.inf)
     for points in blocks():
-        cell = np.searchsorted(codes, grid.codes(points, cells))
-        away = points - means.take(cell, axis=0)
-        squared, before = dot(away, away), least.copy()
-        np.minimum.at(least, cell, squared)
-        new, old = np.flatnonzero(squared == least[cell]), np.flatnonzero(before == least)
-        points, cell = np.concatenate([points[new], nearest[old]]), np.concatenate([cell[new], old])
+        code = grid.codes(points, cells)
+        order = np.argsort(code)
+        points, code = points.take(order, axis=0), code[order]
+        begin = _begins(code)
+        cell, size = np.searchsorted(codes, code[begin]), np.diff(begin, append=len(code))
+        away = points - np.repeat(means[cell], size, axis=0)
+        squared, before = dot(away, away), least[cell]
+        least[cell] = np.minimum(before, np.minimum.reduceat(squared, begin))
+        new, old = np.flatnonzero(squared == np.repeat(least[cell], size)), cell[before == least[cell]]
+        points, cell = np.concatenate([points[new], nearest[old]]), np.concatenate([np.repeat(cell, size)[new], old])
         order = np.lexsort((*points.T, grid.codes(points, FINEST_CELLS), cell))
         first = order[_begins(cell[order])]
         nearest[cell[first]] = points[first]

@@ -145,7 +145,7 @@ def on_sample(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skele
 
     Of every vertex there is a regular sample, so that thin parts keep all. The more of the cloud is noise, the more
     points are taken, since their mean is what is known of the surface. In the result a point that had a vertex has that
-    of the nearest point of the sample.
+    of the nearest of these points, or that of its stand-in.
     """
     rows, m = skeleton.surface_points, len(skeleton.vertices)
     clean = 1 - skeleton.report.noise
@@ -165,8 +165,11 @@ def on_sample(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skele
     others = skeleton.vertex_of_point >= 0
     others[rows] = False
     others = np.flatnonzero(others)
-    others = others[morton_order(skeleton.points[others])]  # the tree is quicker with what is near in turn
-    owner[others] = made.vertex_of_point[cKDTree(points).query(skeleton.points[others])[1]]
+    stand_ins = skeleton.stand_ins[others]
+    alone = others[stand_ins == others]
+    alone = alone[morton_order(skeleton.points[alone])]  # the tree is quicker with what is near in turn
+    owner[alone] = made.vertex_of_point[cKDTree(points).query(skeleton.points[alone])[1]]
+    owner[others] = owner[stand_ins]
     return with_fields(made, points=skeleton.points, normals=skeleton.normals, vertex_of_point=owner)
 
 
