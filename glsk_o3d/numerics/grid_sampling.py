@@ -1,11 +1,14 @@
 """A sample that stands for a large cloud: of one in memory, and of one that comes in blocks."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable, Iterator
 from itertools import pairwise
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from .cores import in_threads
 from .frame import check_extent
 from .groups import group_sum
 from .morton import FINEST_CELLS, MORTON_BITS, morton_codes, sort_within
@@ -64,10 +67,8 @@ def _reach(blocks: Iterable[np.ndarray]) -> tuple[int, np.ndarray, np.ndarray]:
     """
     n, low, high = 0, np.full(3, np.inf), np.full(3, -np.inf)
     some, mixed, share = np.empty((0, 3)), np.empty(0, np.uint64), np.uint64(0)
-    for points in blocks:
-        least, most = box(points)
+    for points, (least, most), numbers in in_threads(lambda part: (part, box(part), _mixed(part)), blocks):
         n, low, high = n + len(points), np.minimum(low, least), np.maximum(high, most)
-        numbers = _mixed(points)
         few = numbers & share == 0
         some, mixed = np.concatenate([some, points[few]]), np.concatenate([mixed, numbers[few]])
         while len(some) > SAMPLED_POINTS and share < ALL_BITS:  # those that one more bit chooses
@@ -115,21 +116,24 @@ def cells_along(codes: np.ndarray, bits: int, n: int) -> float:
 def sample_grid(points: np.ndarray, n: int) -> Sample:
     """Keep of every cell of a cubic grid with about n occupied cells the point nearest to the mean of its points."""
     grid = _grid(*_reach(_chunks(points)))
-    code = grid.codes(points, FINEST_CELLS)
+    code = np.concatenate([*in_threads(lambda part: grid.codes(part, FINEST_CELLS), _chunks(points))])
     order = sort_within(points, code, np.argsort(code))
     cells = cells_along(code[order], MORTON_BITS, n)
     if cells == FINEST_CELLS:
         return everybody(points)
-    code = grid.codes(points, cells)[order]
+    code = np.concatenate([*in_threads(lambda part: grid.codes(part, cells), _chunks(points))])[order]
     again = np.argsort(code, kind="stable")
     order, code = order[again], code[again]
     begin = np.append(_begins(code), len(code))
-    kept, weight = np.empty(len(begin) - 1, int), np.empty(len(begin) - 1)
-    parts = np.searchsorted(begin, range(0, len(code) + GRID_CHUNK, GRID_CHUNK)).clip(max=len(kept))
-    for first, last in pairwise(np.unique(parts).tolist()):
-        rows = order[begin[first] : begin[last]]
-        middle, weight[first:last] = _middles(points.take(rows, axis=0), begin[first:last] - begin[first])
-        kept[first:last] = rows[middle]
+
+    def middles(cells: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+        rows, some = order[begin[cells[0]] : begin[cells[1]]], slice(*cells)
+        middle, weight = _middles(points.take(rows, axis=0), begin[some] - begin[some.start])
+        return rows[middle], weight
+
+    parts = np.searchsorted(begin, range(0, len(code) + GRID_CHUNK, GRID_CHUNK)).clip(max=len(begin) - 1)
+    found = in_threads(middles, pairwise(np.unique(parts).tolist()))
+    kept, weight = (np.concatenate(each) for each in zip(*found, strict=True))
     representative = np.empty(len(points), int)
     representative[order] = np.repeat(np.arange(len(kept)), np.diff(begin))
     return kept, representative, weight
@@ -149,6 +153,10 @@ def _middles(points: np.ndarray, begin: np.ndarray) -> tuple[np.ndarray, np.ndar
     squared = dot(away, away)
     nearest = np.flatnonzero(squared == np.repeat(np.minimum.reduceat(squared, begin), size))
     return nearest[np.searchsorted(nearest, begin)], weight
+
+
+def _distinct(ordered: np.ndarray) -> np.ndarray:
+    return ordered[_begins(ordered)]
 
 
 def _begins(ordered: np.ndarray) -> np.ndarray:
@@ -181,29 +189,47 @@ def sample_blocks(blocks: Blocks, size: Callable[[int], int]) -> tuple[np.ndarra
 
 def _fineness(blocks: Blocks, grid: Grid, n: int) -> float:
     """Cells along the grid for about n to be occupied."""
+
+    def occupied(points: np.ndarray) -> np.ndarray:
+        return _distinct(np.sort(grid.codes(points, FINEST_CELLS)))
+
     codes, bits = np.empty(0, np.uint64), MORTON_BITS
-    for points in blocks():
-        found = grid.codes(points, FINEST_CELLS) >> np.uint64(3 * (MORTON_BITS - bits))
-        codes = np.sort(np.concatenate([codes, found]))
-        codes = codes[_begins(codes)]
+    for found in in_threads(occupied, blocks()):
+        found = _distinct(found >> np.uint64(3 * (MORTON_BITS - bits)))
+        codes = _distinct(np.sort(np.concatenate([codes, found])))
         while len(codes) > CELLS_KEPT * n:
-            codes, bits = codes >> np.uint64(3), bits - 1
-            codes = codes[_begins(codes)]
+            codes, bits = _distinct(codes >> np.uint64(3)), bits - 1
     return cells_along(codes, bits, n)
+
+
+class _Cells(NamedTuple):
+    """Some points, those of each cell of a grid together."""
+
+    codes: np.ndarray  # (c,) of the cells, ascending
+    begin: np.ndarray  # (c,) rows where those of each cell begin
+    size: np.ndarray  # (c,) their number
+    points: np.ndarray  # (m, 3)
+
+    @classmethod
+    def of(cls, points: np.ndarray, grid: Grid, cells: float) -> _Cells:
+        code = grid.codes(points, cells)
+        order = np.argsort(code, kind="stable")
+        begin = _begins(code[order])
+        return cls(code[order[begin]], begin, np.diff(begin, append=len(code)), points.take(order, axis=0))
 
 
 def _means(blocks: Blocks, grid: Grid, cells: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Codes (c,) of the occupied cells, ascending, and the number (c,) and mean (c, 3) of the points in each."""
+
+    def summed(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        each = _Cells.of(points, grid, cells)
+        return each.codes, each.size, np.add.reduceat(each.points, each.begin)
+
     codes, counts, sums = np.empty(0, np.uint64), np.empty(0, int), np.empty((0, 3))
-    for points in blocks():
-        code = grid.codes(points, cells)
-        order = np.argsort(code, kind="stable")
-        code = code[order]
-        begin = _begins(code)
-        codes, cell = np.unique(np.concatenate([codes, code[begin]]), return_inverse=True)
-        counts = np.bincount(cell, np.concatenate([counts, np.diff(begin, append=len(code))])).astype(int)
-        here = np.add.reduceat(points.take(order, axis=0), begin)
-        sums = group_sum(np.concatenate([sums, here]), cell, len(codes))
+    for there, size, total in in_threads(summed, blocks()):
+        codes, cell = np.unique(np.concatenate([codes, there]), return_inverse=True)
+        counts = np.bincount(cell, np.concatenate([counts, size])).astype(int)
+        sums = group_sum(np.concatenate([sums, total]), cell, len(codes))
     return codes, counts, sums / counts[:, None]
 
 
@@ -212,18 +238,23 @@ def _nearest(blocks: Blocks, grid: Grid, cells: float, codes: np.ndarray, means:
 
     Within a cell of the finest grid their coordinates decide, the last first.
     """
+
+    def candidates(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of every cell of a block the points nearest to its mean, with their cells and squared distances."""
+        each = _Cells.of(points, grid, cells)
+        cell = np.searchsorted(codes, each.codes)
+        away = each.points - np.repeat(means[cell], each.size, axis=0)
+        squared = dot(away, away)
+        some = np.flatnonzero(squared == np.repeat(np.minimum.reduceat(squared, each.begin), each.size))
+        return each.points[some], np.repeat(cell, each.size)[some], squared[some]
+
     nearest, least = np.zeros(means.shape), np.full(len(means), np.inf)
-    for points in blocks():
-        code = grid.codes(points, cells)
-        order = np.argsort(code)
-        points, code = points.take(order, axis=0), code[order]
-        begin = _begins(code)
-        cell, size = np.searchsorted(codes, code[begin]), np.diff(begin, append=len(code))
-        away = points - np.repeat(means[cell], size, axis=0)
-        squared, before = dot(away, away), least[cell]
-        least[cell] = np.minimum(before, np.minimum.reduceat(squared, begin))
-        new, old = np.flatnonzero(squared == np.repeat(least[cell], size)), cell[before == least[cell]]
-        points, cell = np.concatenate([points[new], nearest[old]]), np.concatenate([np.repeat(cell, size)[new], old])
+    for points, cell, squared in in_threads(candidates, blocks()):
+        some = squared <= least[cell]
+        points, cell, squared = points[some], cell[some], squared[some]
+        again = np.unique(cell[squared == least[cell]])  # of which there was one as near before
+        least[cell] = squared
+        points, cell = np.concatenate([points, nearest[again]]), np.append(cell, again)
         order = np.lexsort((*points.T, grid.codes(points, FINEST_CELLS), cell))
         first = order[_begins(cell[order])]
         nearest[cell[first]] = points[first]

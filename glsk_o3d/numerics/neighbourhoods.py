@@ -1,13 +1,12 @@
 """Nearest neighbours and how they are spread."""
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from itertools import pairwise
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .cores import threads
+from .cores import in_threads, threads
 from .eigen import principal_parts
 from .vectors import PAIRS, Floats, dot, unit
 
@@ -29,15 +28,10 @@ def nearest_neighbours(points: np.ndarray, k: int, of: np.ndarray | None = None)
         distance[start:stop], neighbour[start:stop] = (np.reshape(each, (stop - start, k)) for each in found)
 
     parts = max(min(threads(), len(asked) // THREAD_POINTS), 1)
-    bounds = np.linspace(0, len(asked), parts + 1).astype(int).tolist()
-    if parts > 1:
-        # Not SciPy's own threads, which outlive their arrays when they are interrupted, and crash the process.
-        with suppress(RuntimeError), ThreadPoolExecutor(parts - 1) as pool:  # an interpreter that ends starts none
-            others = pool.map(ask, bounds[1:-1], bounds[2:])
-            ask(*bounds[:2])
-            list(others)
-            return distance, neighbour
-    ask(0, len(asked))
+    bounds = pairwise(np.linspace(0, len(asked), parts + 1).astype(int).tolist())
+    # Not SciPy's own threads, which outlive their arrays when they are interrupted, and crash the process.
+    for _ in (in_threads if parts > 1 else map)(lambda part: ask(*part), bounds):
+        pass
     return distance, neighbour
 
 

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from glsk_o3d.numerics.cores import cores, threads
+from glsk_o3d.numerics.cores import cores, in_threads, threads
 
 
 def test_cores_are_those_that_may_be_used():
@@ -23,3 +23,39 @@ def test_cores_are_those_that_may_be_used():
 def test_threads_are_as_many_as_openmp_may_use(said, expected, monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", said)
     assert threads() == (expected or cores())
+
+
+@pytest.mark.parametrize("n", [1, 3])
+def test_threads_give_what_they_made_in_order_and_take_few_items_ahead(n, monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", str(n))
+    taken = []
+
+    def items():
+        for number in range(20):
+            taken.append(number)
+            yield number
+
+    for k, made in enumerate(in_threads(lambda number: number**2, items())):
+        assert made == k**2
+        assert len(taken) <= k + 1 + (n if n > 1 else 0)
+    assert len(taken) == 20
+
+
+@pytest.mark.parametrize("n", [1, 3])
+def test_what_goes_wrong_in_a_thread_is_told(n, monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", str(n))
+    found = in_threads(lambda number: 6 // number, [3, 0, 1])
+    assert next(found) == 2
+    with pytest.raises(ZeroDivisionError):
+        next(found)
+
+
+def test_an_interpreter_that_ends_goes_on_without_threads():
+    code = (
+        "import atexit; from glsk_o3d.numerics.cores import in_threads\n"
+        "import concurrent.futures.thread as pools\n"
+        "atexit.register(lambda: print(*in_threads(abs, [-1, -2])))"
+    )
+    env = os.environ | {"OMP_NUM_THREADS": "2"}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=env)
+    assert (done.stdout, done.stderr) == ("1 2\n", "")
