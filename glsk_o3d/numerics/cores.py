@@ -25,7 +25,7 @@ def threads() -> int:
 def in_threads(function: Callable[[Item], Made], items: Iterable[Item]) -> Iterator[Made]:
     """What a function makes of each item, in their order, on as many `threads`.
 
-    No more items than these are taken ahead. It gains where most of the time is NumPy's, which lets other threads go on.
+    No more items than these are taken ahead. It gains where most time is NumPy's, which lets other threads go on.
     """
     n = threads()
     if n == 1:
