@@ -9,7 +9,13 @@ from scipy.spatial import cKDTree
 from .numerics.eigen import main_direction
 from .numerics.frame import MIN_POINTS
 from .numerics.groups import group_sum
-from .numerics.neighbourhoods import distances, local_outlier_ratio, nearest_left, nearest_moved, nearest_neighbours
+from .numerics.neighbourhoods import (
+    local_outlier_ratio,
+    mean_distances,
+    nearest_left,
+    nearest_moved,
+    nearest_neighbours,
+)
 from .numerics.pairing import Pairs, merge_pairs
 from .numerics.vectors import PAIRS
 from .parameters import documented, parameter
@@ -83,7 +89,7 @@ def to_ridges(points: Points, passes: int) -> Points:
     denoised = subspace_mean_shift(points.cloud, points.noise, passes, points.weight)
     k = points.neighbours.shape[1]
     neighbours = nearest_moved(denoised, points.neighbours, points.noise > 0)
-    mean_distance = distances(denoised, neighbours[:, 1:]).mean(axis=1)
+    mean_distance = mean_distances(denoised, neighbours)
     outlier = (local_outlier_ratio(mean_distance, neighbours) > DENOISED_RATIO) & (points.noise > 0)
     if outlier.sum() > len(denoised) - max(k, MIN_POINTS):  # too few would be left
         outlier[:] = False

@@ -7,7 +7,7 @@ import numpy as np
 
 from .numerics.frame import MIN_POINTS
 from .numerics.groups import component_labels
-from .numerics.neighbourhoods import distances, local_outlier_ratio, nearest_neighbours, principal, row_medians
+from .numerics.neighbourhoods import local_outlier_ratio, mean_distances, nearest_neighbours, principal, row_medians
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .points import Points
@@ -58,8 +58,7 @@ class OutlierRemover(Filter[Points]):
             return points
         points.check_whole(self)
         cloud, neighbours = points.cloud, points.neighbours
-        distance = distances(cloud, neighbours)
-        left, neighbours = inliers(cloud, points.weight, distance, neighbours, self.outlier_factor, MIN_POINTS)
+        left, neighbours = inliers(cloud, points.weight, neighbours, self.outlier_factor, MIN_POINTS)
         if len(left) == len(points):
             return points
         gone = np.ones(len(points), bool)
@@ -68,7 +67,7 @@ class OutlierRemover(Filter[Points]):
 
 
 def inliers(
-    points: np.ndarray, weight: np.ndarray, distance: np.ndarray, neighbours: np.ndarray, factor: float, least: int
+    points: np.ndarray, weight: np.ndarray, neighbours: np.ndarray, factor: float, least: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """The points left when those far from all others are set aside, round by round.
 
@@ -76,10 +75,10 @@ def inliers(
     neighbours are outliers, too; then what floats in space goes, see `in_floating_cluster`. At least `least` points are
     left. Returned are their rows (m,), ascending, and their nearest neighbours among those left, (m, k).
     """
-    left = np.arange(len(points))
+    left, distance = np.arange(len(points)), mean_distances(points, neighbours)
     for _ in range(OUTLIER_ROUNDS):
         # as near as the neighbours would be if all were there
-        mean = distance[:, 1:].mean(axis=1) / np.sqrt(weight[left].take(neighbours).mean(axis=1))
+        mean = distance / np.sqrt(weight[left].take(neighbours).mean(axis=1))
         found = local_outlier_ratio(mean, neighbours) > factor
         if mean.max() > FLOATING_RATIO * mean.min():  # else none can float
             found |= in_floating_cluster(points[left], weight[left], mean, neighbours)
@@ -88,10 +87,10 @@ def inliers(
             break
         left, index = left[keep], np.cumsum(~found) - 1
         k = min(neighbours.shape[1], len(left))
-        changed = np.flatnonzero(found[neighbours[keep, :k]].any(axis=1))
-        distance, neighbours = distance[keep, :k], index[neighbours[keep, :k]]
-        there = points[left]
-        distance[changed], neighbours[changed] = nearest_neighbours(there, k, of=there[changed])
+        changed = np.flatnonzero(found[neighbours[keep]].any(axis=1))
+        distance, neighbours, there = distance[keep], index[neighbours[keep, :k]], points[left]
+        near, neighbours[changed] = nearest_neighbours(there, k, of=there[changed])
+        distance[changed] = near[:, 1:].mean(axis=1)
     return left, neighbours
 
 

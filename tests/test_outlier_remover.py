@@ -16,7 +16,7 @@ SURFACE = samples.torus(N, ring_radius=0.4, radius=0.1).points
 
 def left(points, weight=None):
     weight = np.ones(len(points)) if weight is None else weight
-    return inliers(points, weight, *nearest_neighbours(points, K), 2.5, 8)[0]
+    return inliers(points, weight, nearest_neighbours(points, K)[1], 2.5, 8)[0]
 
 
 def floating(n, seed=0, reach=0.6):

@@ -35,13 +35,14 @@ def nearest_neighbours(points: np.ndarray, k: int, of: np.ndarray | None = None)
     return distance, neighbour
 
 
-def distances(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
-    """Distance of every point (n, 3) to each of its neighbours, (n, k) float array as of `nearest_neighbours`."""
-    squared = np.zeros(neighbours.shape)
-    for x in np.ascontiguousarray(points.T):
-        away = x.take(neighbours) - x[:, None]
-        squared += away * away
-    return np.sqrt(squared)
+def mean_distances(points: np.ndarray, neighbours: np.ndarray) -> Floats:
+    """Mean distance of every point (n, 3) to its neighbours (n, k), of which it is the first itself, (n,)."""
+    mean: Floats = np.empty(len(points))
+    for start in range(0, len(points), SCATTER_CHUNK):
+        part = slice(start, start + SCATTER_CHUNK)
+        away = (x.take(neighbours[part, 1:]) - x[part, None] for x in np.ascontiguousarray(points.T))
+        mean[part] = np.sqrt(sum(each * each for each in away)).mean(axis=1)
+    return mean
 
 
 def nearest_left(points: np.ndarray, neighbours: np.ndarray, left: np.ndarray, k: int) -> np.ndarray:
