@@ -144,9 +144,9 @@ class Skeleton:
 
     @cached_property
     def stand_ins(self) -> np.ndarray:
-        """Of every input point that of the sample which stands for it, (N,) int array, -1 of dropped ones.
+        """For every input point the one of a sample that stands for it, itself if it is of the sample, (N,) int array.
 
-        Those of the `Contraction` if a Connector has just made it, and each for itself once it was changed.
+        Those of `Contraction.stand_ins` if a Connector has just made it, and each for itself once it was changed.
         """
         return np.arange(len(self.points))
 

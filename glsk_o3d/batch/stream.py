@@ -84,7 +84,7 @@ class Skeletonizer:
             Where a cloud cannot be skeletonised. That ends the stream: the skeletons before it were given, and clouds
             taken ahead are lost. Another stream may go on with those that follow.
         BatchError
-            A process died, or the Skeletonizer was closed.
+            With several workers: a process died, or the Skeletonizer was closed.
         """
         if self._count == 1:
             yield from map(self.pipeline, clouds)

@@ -22,23 +22,27 @@ def threads() -> int:
     return int(wanted) if wanted.isdecimal() and int(wanted) > 0 else cores()
 
 
-def in_threads(function: Callable[[Item], Made], items: Iterable[Item]) -> Iterator[Made]:
-    """What a function makes of each item, in their order, on as many `threads`.
+def in_threads(function: Callable[[Item], Made], items: Iterable[Item], most: int | None = None) -> Iterator[Made]:
+    """What a function makes of each item, in their order, computed on `threads()` threads, at `most` so many.
 
-    No more items than these are taken ahead. It gains where most time is NumPy's, which lets other threads go on.
+    No more items than there are threads are taken ahead of the one that is given. It gains where most time is NumPy's,
+    which lets other threads go on. Where no more threads can be started a function may be called twice of one item, so
+    it must have no other effects.
     """
-    n = threads()
+    n = min(threads(), most or threads())
     if n == 1:
         yield from map(function, items)
         return
-    with ThreadPoolExecutor(n) as pool:
-        made = deque[Callable[[], Made]]()
+    pool, made = ThreadPoolExecutor(n), deque[Callable[[], Made]]()
+    try:
         for item in items:
             try:
                 made.append(pool.submit(function, item).result)
-            except RuntimeError:  # an interpreter that ends starts no threads
+            except RuntimeError:  # an interpreter that ends starts no threads, nor does a system that has too many
                 made.append(partial(function, item))
             if len(made) > n:
                 yield made.popleft()()
-        for result in made:
-            yield result()
+        while made:
+            yield made.popleft()()
+    finally:
+        pool.shutdown(cancel_futures=True)

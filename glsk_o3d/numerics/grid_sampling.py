@@ -51,8 +51,7 @@ class Grid(NamedTuple):
 
     def codes(self, points: np.ndarray, cells: float) -> np.ndarray:
         """Morton codes of the cells of points, (m,) uint64 array, with so many cells along the longest side."""
-        clipped = (np.clip(part, self.low, self.high) for part in _chunks(points))
-        return np.concatenate([morton_codes(part, cells, self.corner, self.extent) for part in clipped])
+        return morton_codes(points, cells, self.corner, self.extent, (self.low, self.high))
 
 
 def _chunks(points: np.ndarray) -> Iterator[np.ndarray]:
@@ -126,9 +125,10 @@ def sample_grid(points: np.ndarray, n: int) -> Sample:
     order, code = order[again], code[again]
     begin = np.append(_begins(code), len(code))
 
-    def middles(cells: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-        rows, some = order[begin[cells[0]] : begin[cells[1]]], slice(*cells)
-        middle, weight = _middles(points.take(rows, axis=0), begin[some] - begin[some.start])
+    def middles(span: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+        first, last = span
+        rows = order[begin[first] : begin[last]]
+        middle, weight = _middles(points.take(rows, axis=0), begin[first:last] - begin[first])
         return rows[middle], weight
 
     parts = np.searchsorted(begin, range(0, len(code) + GRID_CHUNK, GRID_CHUNK)).clip(max=len(begin) - 1)
@@ -156,6 +156,7 @@ def _middles(points: np.ndarray, begin: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def _distinct(ordered: np.ndarray) -> np.ndarray:
+    """Each number of an ascending array once."""
     return ordered[_begins(ordered)]
 
 
@@ -167,15 +168,16 @@ def _begins(ordered: np.ndarray) -> np.ndarray:
 Blocks = Callable[[], Iterable[np.ndarray]]
 """Gives the (m, 3) float arrays of a cloud, none of them empty, whenever it is asked."""
 
+BLOCK_THREADS = 4  # speed: each takes 110 MB for a block of a million points
 CELLS_KEPT = 8  # derived: cells of the finest grid kept, over those wanted: of one half as fine an eighth are left
 
 
 def sample_blocks(blocks: Blocks, size: Callable[[int], int]) -> tuple[np.ndarray, np.ndarray]:
     """The points (c, 3) that `sample_cloud` keeps, and how many each stands for, (c,); `size` says how many of so many.
 
-    The cloud is read four times, and memory does not grow with it: for how far it reaches, how fine the grid must be,
-    the means of the cells, and the points nearest to them; a small one twice. Copies of a point count, unlike those in
-    memory.
+    The cloud is read four times: for how far it reaches, how fine the grid must be, the means of the cells, and the
+    points nearest to them; a small one twice. Memory does not grow with it, but with the threads, each of which holds a
+    block or two. Copies of a point count, unlike those in memory.
     """
     total, ends, some = _reach(part for block in blocks() for part in _chunks(block))
     n = size(total)
@@ -194,7 +196,7 @@ def _fineness(blocks: Blocks, grid: Grid, n: int) -> float:
         return _distinct(np.sort(grid.codes(points, FINEST_CELLS)))
 
     codes, bits = np.empty(0, np.uint64), MORTON_BITS
-    for found in in_threads(occupied, blocks()):
+    for found in in_threads(occupied, blocks(), BLOCK_THREADS):
         found = _distinct(found >> np.uint64(3 * (MORTON_BITS - bits)))
         codes = _distinct(np.sort(np.concatenate([codes, found])))
         while len(codes) > CELLS_KEPT * n:
@@ -226,7 +228,7 @@ def _means(blocks: Blocks, grid: Grid, cells: float) -> tuple[np.ndarray, np.nda
         return each.codes, each.size, np.add.reduceat(each.points, each.begin)
 
     codes, counts, sums = np.empty(0, np.uint64), np.empty(0, int), np.empty((0, 3))
-    for there, size, total in in_threads(summed, blocks()):
+    for there, size, total in in_threads(summed, blocks(), BLOCK_THREADS):
         codes, cell = np.unique(np.concatenate([codes, there]), return_inverse=True)
         counts = np.bincount(cell, np.concatenate([counts, size])).astype(int)
         sums = group_sum(np.concatenate([sums, total]), cell, len(codes))
@@ -249,11 +251,13 @@ def _nearest(blocks: Blocks, grid: Grid, cells: float, codes: np.ndarray, means:
         return each.points[some], np.repeat(cell, each.size)[some], squared[some]
 
     nearest, least = np.zeros(means.shape), np.full(len(means), np.inf)
-    for points, cell, squared in in_threads(candidates, blocks()):
-        some = squared <= least[cell]
+    for points, cell, squared in in_threads(candidates, blocks(), BLOCK_THREADS):
+        some = np.flatnonzero(squared <= least[cell])
+        if not len(some):
+            continue
         points, cell, squared = points[some], cell[some], squared[some]
-        again = np.unique(cell[squared == least[cell]])  # of which there was one as near before
-        least[cell] = squared
+        again = np.unique(cell[squared == least[cell]])  # cells whose point so far is as near: it competes
+        least[cell] = squared  # all of a cell are equally far
         points, cell = np.concatenate([points, nearest[again]]), np.append(cell, again)
         order = np.lexsort((*points.T, grid.codes(points, FINEST_CELLS), cell))
         first = order[_begins(cell[order])]

@@ -31,15 +31,22 @@ def sort_within(points: np.ndarray, codes: np.ndarray, order: np.ndarray) -> np.
     return order
 
 
-def morton_codes(points: np.ndarray, cells: float, corner: np.ndarray, extent: float) -> np.ndarray:
+def morton_codes(
+    points: np.ndarray,
+    cells: float,
+    corner: np.ndarray,
+    extent: float,
+    reach: tuple[np.ndarray, np.ndarray] | None = None,
+) -> np.ndarray:
     """Morton code of the cell of every point, (n,) uint64, in a cubic grid around the points.
 
-    `cells`, at most 2^21 - 1, lie along its side `extent`, and its lowest corner is `corner` (3,).
+    `cells`, at most 2^21 - 1, lie along its side `extent`, and its lowest corner is `corner` (3,). Coordinates out of
+    the `reach`, two (3,) float arrays, count as the nearest in it.
     """
     code = np.zeros(len(points), np.uint64)
     for start in range(0, len(points), MORTON_CHUNK):
         part = slice(start, start + MORTON_CHUNK)
-        for axis, column in enumerate(points[part].T):
+        for axis, column in enumerate((points[part] if reach is None else np.clip(points[part], *reach)).T):
             cell = ((column - corner[axis]) / max(extent, TINY) * cells).astype(np.uint64)
             code[part] |= _spread(cell) << np.uint64(axis)
     return code

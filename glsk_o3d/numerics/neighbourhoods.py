@@ -23,15 +23,16 @@ def nearest_neighbours(points: np.ndarray, k: int, of: np.ndarray | None = None)
     tree, asked = cKDTree(points, leafsize=24, balanced_tree=False), points if of is None else of
     distance, neighbour = np.empty((len(asked), k)), np.empty((len(asked), k), int)
 
-    def ask(start: int, stop: int) -> None:
+    def ask(part: tuple[int, int]) -> None:
+        start, stop = part
         found = tree.query(asked[start:stop], k)
         distance[start:stop], neighbour[start:stop] = (np.reshape(each, (stop - start, k)) for each in found)
 
     parts = max(min(threads(), len(asked) // THREAD_POINTS), 1)
-    bounds = pairwise(np.linspace(0, len(asked), parts + 1).astype(int).tolist())
+    bounds = np.linspace(0, len(asked), parts + 1).astype(int).tolist()
     # Not SciPy's own threads, which outlive their arrays when they are interrupted, and crash the process.
-    for _ in (in_threads if parts > 1 else map)(lambda part: ask(*part), bounds):
-        pass
+    for _ in in_threads(ask, pairwise(bounds), parts):
+        pass  # it is written in place
     return distance, neighbour
 
 

@@ -145,7 +145,7 @@ def on_sample(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skele
 
     Of every vertex there is a regular sample, so that thin parts keep all. The more of the cloud is noise, the more
     points are taken, since their mean is what is known of the surface. In the result a point that had a vertex has that
-    of the nearest of these points, or that of its stand-in.
+    of its stand-in, and one that is its own that of the nearest of these points.
     """
     rows, m = skeleton.surface_points, len(skeleton.vertices)
     clean = 1 - skeleton.report.noise

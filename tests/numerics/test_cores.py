@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import threading
 
 import pytest
 
@@ -53,9 +54,33 @@ def test_what_goes_wrong_in_a_thread_is_told(n, monkeypatch):
 def test_an_interpreter_that_ends_goes_on_without_threads():
     code = (
         "import atexit; from glsk_o3d.numerics.cores import in_threads\n"
-        "import concurrent.futures.thread as pools\n"
         "atexit.register(lambda: print(*in_threads(abs, [-1, -2])))"
     )
     env = os.environ | {"OMP_NUM_THREADS": "2"}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=env)
     assert (done.stdout, done.stderr) == ("1 2\n", "")
+
+
+@pytest.mark.parametrize("n", [1, 3])
+def test_who_stops_early_does_not_wait_for_what_has_not_begun(n, monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", str(n))
+    begun, go_on = [], threading.Event()
+
+    def wait(number):
+        begun.append(number)
+        if number:
+            go_on.wait(10)
+        return number
+
+    found = in_threads(wait, range(20), 2)
+    assert next(found) == 0
+    go_on.set()
+    found.close()
+    assert len(begun) <= 4
+
+
+def test_no_more_threads_than_asked_for(monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "5")
+    names = set(in_threads(lambda _: threading.current_thread().name, range(50), 2))
+    assert len(names) <= 2
+    assert set(in_threads(lambda _: threading.current_thread(), range(3), 1)) == {threading.current_thread()}

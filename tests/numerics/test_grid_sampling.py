@@ -5,6 +5,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from glsk_o3d.numerics import grid_sampling
 from glsk_o3d.numerics.grid_sampling import sample_blocks, sample_cloud, sample_grid
 from glsk_o3d.samples import torus
 
@@ -36,6 +37,30 @@ def test_the_sample_of_blocks_is_that_of_the_whole(points, rows):
     np.testing.assert_array_equal(counts, weight)
 
 
+@pytest.mark.parametrize(("n", "rows"), [(5001, 1000), (5001, 5000), (300, 1)])
+def test_blocks_that_have_nothing_nearer_change_nothing(n, rows):
+    """Such as a last block of one point."""
+    for seed in range(5):
+        points = np.random.default_rng(seed).random((n, 3))
+        kept = sample_grid(points, n // 10)[0]
+        np.testing.assert_array_equal(sample_blocks(in_blocks(points, rows), lambda _: n // 10)[0], points[kept])
+
+
+@pytest.mark.parametrize(("chunk", "threads"), [(37, 1), (1000, 3)])
+def test_threads_and_how_many_points_at_a_time_change_nothing(chunk, threads, monkeypatch):
+    rng = np.random.default_rng(0)
+    # one cell has more points than a chunk, and many of them are copies
+    points = np.concatenate([rng.random((4000, 3)), 0.5 + 1e-4 * rng.random((3000, 3)), np.full((2000, 3), 0.25)])
+    points = rng.permutation(np.concatenate([points, points[::3]]))
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    known = sample_grid(points, 500), sample_blocks(in_blocks(points, 2500), lambda _: 500)
+    monkeypatch.setattr(grid_sampling, "GRID_CHUNK", chunk)
+    monkeypatch.setenv("OMP_NUM_THREADS", str(threads))
+    found = sample_grid(points, 500), sample_blocks(in_blocks(points, 2500), lambda _: 500)
+    for one, other in zip(known[0] + known[1], found[0] + found[1], strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
 def test_a_sample_of_a_sample_counts_all_points():
     points = torus(20000).points
     kept, _, counts = sample_grid(points, 4000)
@@ -46,7 +71,9 @@ def test_a_sample_of_a_sample_counts_all_points():
 
 
 @pytest.mark.slow
-def test_memory_does_not_grow_with_the_cloud():
+def test_memory_does_not_grow_with_the_cloud(monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")  # each thread holds blocks, and how many at once is chance
+
     def peak(n):
         tracemalloc.start()
         sample_blocks(lambda: (np.random.default_rng(k).normal(size=(20000, 3)) for k in range(n)), lambda _: 2000)
