@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import re
 import time
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Annotated
@@ -48,6 +49,7 @@ def _folder(path: Path | None) -> Path | None:
     return path
 
 
+Page = partial(typer.Argument, metavar="PAGE", help="Markdown page to put the tables into.")
 Sizes = Annotated[str, typer.Option("--sizes", metavar="NUMBERS", help="Points, with commas.")]
 Kind = Annotated[str, typer.Option("--kind", metavar="KIND", help="clean, noise1, ...; see the README.")]
 PublishedTo = Annotated[int, typer.Option("--published-to", help="wen2024 and cao2010 only up to so many points.")]
@@ -119,10 +121,7 @@ def rate(
 
 @app.command()
 def stream(
-    page: Annotated[
-        Path | None,
-        typer.Argument(metavar="PAGE", help="Markdown page to put the table into.", callback=page_with("stream")),
-    ] = None,
+    page: Annotated[Path | None, Page(callback=page_with("stream"))] = None,
     sizes: Sizes = "1024,4096",
     scenes: Annotated[
         str, typer.Option("--scenes", metavar="NAMES", help="Families of random shapes.")
@@ -139,10 +138,7 @@ def stream(
 
 @app.command()
 def scans(
-    page: Annotated[
-        Path | None,
-        typer.Argument(metavar="PAGE", help="Markdown page to put the tables into.", callback=page_with("scans")),
-    ] = None,
+    page: Annotated[Path | None, Page(callback=page_with("scans"))] = None,
     folder: Annotated[
         list[Path] | None, typer.Option("--folder", metavar="DIR", help="Scans of shapes: depth2, misreg and lidar.")
     ] = None,
@@ -161,10 +157,7 @@ def scans(
 
 @app.command()
 def large(
-    page: Annotated[
-        Path | None,
-        typer.Argument(metavar="PAGE", help="Markdown page to put the table into.", callback=page_with("large")),
-    ] = None,
+    page: Annotated[Path | None, Page(callback=page_with("large"))] = None,
     sizes: Sizes = "65536,1048576",
     shapes: Shapes = "",
     file: Annotated[bool, typer.Option("--file", help="Also the whole command, from a PLY file to one.")] = False,
@@ -180,10 +173,7 @@ def large(
 
 @app.command()
 def huge(
-    page: Annotated[
-        Path | None,
-        typer.Argument(metavar="PAGE", help="Markdown page to put the table into.", callback=page_with("huge")),
-    ] = None,
+    page: Annotated[Path | None, Page(callback=page_with("huge"))] = None,
     points: Annotated[int, typer.Option("--points", help="Of each file.")] = 100_000_000,
     against: Annotated[int, typer.Option("--against", help="Points to skeletonise in memory.")] = 1_000_000,
     endings: Annotated[str, typer.Option("--endings", help="Of the files: .ply, .las, .laz.")] = ".ply,.laz",
@@ -205,9 +195,7 @@ def huge(
 def everything(
     page: Annotated[
         Path | None,
-        typer.Argument(
-            metavar="PAGE", help="Markdown page to put the tables into; pictures beside it.", callback=page_with(*PARTS)
-        ),
+        Page(help="Markdown page to put the tables into; pictures beside it.", callback=page_with(*PARTS)),
     ] = None,
     own: Own = False,
     sizes: Sizes = ALL_SIZES,

@@ -55,8 +55,13 @@ class Grid(NamedTuple):
 
 
 def _chunks(points: np.ndarray) -> Iterator[np.ndarray]:
-    """The rows of (m, 3), m > 0, some at a time."""
+    """The rows of (m, 3), some at a time."""
     return (points[start : start + GRID_CHUNK] for start in range(0, len(points), GRID_CHUNK))
+
+
+def _codes(points: np.ndarray, grid: Grid, cells: float) -> np.ndarray:
+    """`Grid.codes` of many points, on all threads."""
+    return np.concatenate([*in_threads(lambda part: grid.codes(part, cells), _chunks(points))])
 
 
 def _reach(blocks: Iterable[np.ndarray]) -> tuple[int, np.ndarray, np.ndarray]:
@@ -66,7 +71,8 @@ def _reach(blocks: Iterable[np.ndarray]) -> tuple[int, np.ndarray, np.ndarray]:
     """
     n, low, high = 0, np.full(3, np.inf), np.full(3, -np.inf)
     some, mixed, share = np.empty((0, 3)), np.empty(0, np.uint64), np.uint64(0)
-    for points, (least, most), numbers in in_threads(lambda part: (part, box(part), _mixed(part)), blocks):
+    parts = (part for block in blocks for part in _chunks(block))
+    for points, (least, most), numbers in in_threads(lambda part: (part, box(part), _mixed(part)), parts):
         n, low, high = n + len(points), np.minimum(low, least), np.maximum(high, most)
         few = numbers & share == 0
         some, mixed = np.concatenate([some, points[few]]), np.concatenate([mixed, numbers[few]])
@@ -114,13 +120,13 @@ def cells_along(codes: np.ndarray, bits: int, n: int) -> float:
 
 def sample_grid(points: np.ndarray, n: int) -> Sample:
     """Keep of every cell of a cubic grid with about n occupied cells the point nearest to the mean of its points."""
-    grid = _grid(*_reach(_chunks(points)))
-    code = np.concatenate([*in_threads(lambda part: grid.codes(part, FINEST_CELLS), _chunks(points))])
+    grid = _grid(*_reach([points]))
+    code = _codes(points, grid, FINEST_CELLS)
     order = sort_within(points, code, np.argsort(code))
     cells = cells_along(code[order], MORTON_BITS, n)
     if cells == FINEST_CELLS:
         return everybody(points)
-    code = np.concatenate([*in_threads(lambda part: grid.codes(part, cells), _chunks(points))])[order]
+    code = _codes(points, grid, cells)[order]
     again = np.argsort(code, kind="stable")
     order, code = order[again], code[again]
     begin = np.append(_begins(code), len(code))
@@ -132,7 +138,7 @@ def sample_grid(points: np.ndarray, n: int) -> Sample:
         return rows[middle], weight
 
     parts = np.searchsorted(begin, range(0, len(code) + GRID_CHUNK, GRID_CHUNK)).clip(max=len(begin) - 1)
-    found = in_threads(middles, pairwise(np.unique(parts).tolist()))
+    found = in_threads(middles, pairwise(_distinct(parts).tolist()))
     kept, weight = (np.concatenate(each) for each in zip(*found, strict=True))
     representative = np.empty(len(points), int)
     representative[order] = np.repeat(np.arange(len(kept)), np.diff(begin))
@@ -149,10 +155,21 @@ def _middles(points: np.ndarray, begin: np.ndarray) -> tuple[np.ndarray, np.ndar
     fresh = np.append(True, x | y | z)
     weight = np.add.reduceat(fresh, begin, dtype=float)
     mean = np.add.reduceat(points * fresh[:, None], begin) / weight[:, None]
+    nearest, _ = _nearest_to(mean, points, begin, size)
+    return nearest[np.searchsorted(nearest, begin)], weight
+
+
+def _nearest_to(
+    mean: np.ndarray, points: np.ndarray, begin: np.ndarray, size: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rows (k,) of the points nearest to a place of each cell, `mean` (c, 3), all that are, and squared distances (k,).
+
+    The points (m, 3) of each cell are together: `size` (c,) of them from the row `begin` (c,) on.
+    """
     away = points - np.repeat(mean, size, axis=0)
     squared = dot(away, away)
-    nearest = np.flatnonzero(squared == np.repeat(np.minimum.reduceat(squared, begin), size))
-    return nearest[np.searchsorted(nearest, begin)], weight
+    rows = np.flatnonzero(squared == np.repeat(np.minimum.reduceat(squared, begin), size))
+    return rows, squared[rows]
 
 
 def _distinct(ordered: np.ndarray) -> np.ndarray:
@@ -179,7 +196,7 @@ def sample_blocks(blocks: Blocks, size: Callable[[int], int]) -> tuple[np.ndarra
     points nearest to them; a small one twice. Memory does not grow with it, but with the threads, each of which holds a
     block or two. Copies of a point count, unlike those in memory.
     """
-    total, ends, some = _reach(part for block in blocks() for part in _chunks(block))
+    total, ends, some = _reach(blocks())
     n = size(total)
     if total <= 2 * n:
         return np.concatenate([np.empty((0, 3)), *blocks()]), np.ones(total, int)
@@ -245,10 +262,8 @@ def _nearest(blocks: Blocks, grid: Grid, cells: float, codes: np.ndarray, means:
         """Of every cell of a block the points nearest to its mean, with their cells and squared distances."""
         each = _Cells.of(points, grid, cells)
         cell = np.searchsorted(codes, each.codes)
-        away = each.points - np.repeat(means[cell], each.size, axis=0)
-        squared = dot(away, away)
-        some = np.flatnonzero(squared == np.repeat(np.minimum.reduceat(squared, each.begin), each.size))
-        return each.points[some], np.repeat(cell, each.size)[some], squared[some]
+        some, squared = _nearest_to(means[cell], each.points, each.begin, each.size)
+        return each.points[some], np.repeat(cell, each.size)[some], squared
 
     nearest, least = np.zeros(means.shape), np.full(len(means), np.inf)
     for points, cell, squared in in_threads(candidates, blocks(), BLOCK_THREADS):

@@ -38,10 +38,10 @@ def nearest_neighbours(points: np.ndarray, k: int, of: np.ndarray | None = None)
 
 def mean_distances(points: np.ndarray, neighbours: np.ndarray) -> Floats:
     """Mean distance of every point (n, 3) to its neighbours (n, k), of which it is the first itself, (n,)."""
-    mean: Floats = np.empty(len(points))
+    coordinates, mean = np.ascontiguousarray(points.T), np.empty(len(points))
     for start in range(0, len(points), SCATTER_CHUNK):
         part = slice(start, start + SCATTER_CHUNK)
-        away = (x.take(neighbours[part, 1:]) - x[part, None] for x in np.ascontiguousarray(points.T))
+        away = (x.take(neighbours[part, 1:]) - x[part, None] for x in coordinates)
         mean[part] = np.sqrt(sum(each * each for each in away)).mean(axis=1)
     return mean
 
