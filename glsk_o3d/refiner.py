@@ -7,6 +7,7 @@ from .decisions import QUESTIONS, Decision
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .refinement.air import cut_air
+from .refinement.aside import Aside
 from .refinement.axis_fit import fit_axis, pull_back_detached
 from .refinement.bridging import bridge_gaps
 from .refinement.diagnostics import measured
@@ -19,10 +20,13 @@ from .refinement.spurs import prune_spurs
 from .refinement.subdivision import subdivide_edges
 from .refinement.wide_ends import level_wide_ends
 from .skeleton import Skeleton
+from .tracer import Tracer
 
 ANSWERS = {"loop": close_loops, "limb": prune_spurs, "air": cut_air, "gap": bridge_gaps}
-ORDER_OF_QUESTIONS = ("loop", "limb", "air", "limb", "gap", "loop", "limb")
-"""Spurs are asked about again after cuts and bridges, which may make them, and loops if bridges made more of them."""
+ORDER_OF_QUESTIONS = ("surface", "loop", "surface", "limb", "air", "limb", "gap", "loop", "limb")
+"""Parts without a surface are set aside at the start, or when their loops are closed.
+
+Spurs are asked about again after cuts and bridges, which may make them, and loops if bridges made more of them."""
 
 
 @documented
@@ -36,7 +40,8 @@ class Refiner(Filter[Skeleton]):
     3. The curve and its radii are fitted to the axis of the surface, to the normals of the points around, even if only
        one side was scanned; again after every change of the graph.
     4. The topology is judged by the surface around the curve: false loops are closed, spurs pruned, branches that cross
-       air cut, and gaps bridged across which the object continues.
+       air cut, and gaps bridged across which the object continues. If most of a large skeleton has no surface, as a
+       crown, that part is set aside before, or once its loops are closed: a Tracer replaces it.
     5. The curve is led straight through wide ends, as of a pan. It settles: it is fitted twice more, also to the points
        themselves where noise has spoilt the normals, and where they hardly differ, as of a leaf of which one side was
        scanned.
@@ -97,13 +102,14 @@ class Refiner(Filter[Skeleton]):
     def _refined(self, skeleton: Skeleton) -> Skeleton:
         skeleton, surface = self._fit(skeleton)
         asks = self.handle or self.limb or self.air or self.bridge
-        if len(skeleton.edges) and len(skeleton.supporting_points) and (asks or self.recentre):
-            skeleton = self._decide(skeleton, surface)
+        aside = None
+        if _may_be_asked(skeleton) and (asks or self.recentre):
+            skeleton, surface, aside = self._decide(skeleton, surface)
         if self.recentre and len(skeleton.vertices):
             skeleton = fit_axis(level_wide_ends(skeleton, surface), self.recentre + 1, surface, settle=True)
             size = binary_size(skeleton)  # fourth powers of lengths must not overflow
             skeleton = scaled(regrow_ends(move_junctions(scaled(skeleton, 1 / size))), size)
-        return measured(skeleton)
+        return measured(aside.put_back(skeleton) if aside else skeleton)
 
     def _fit(self, skeleton: Skeleton) -> tuple[Skeleton, SurfaceGraph]:
         """Make the graph one-dimensional and centre it in the surface around it."""
@@ -113,15 +119,23 @@ class Refiner(Filter[Skeleton]):
             skeleton = pull_back_detached(skeleton)
         return self._centred(skeleton, surface), surface
 
-    def _decide(self, skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
+    def _decide(self, skeleton: Skeleton, surface: SurfaceGraph) -> tuple[Skeleton, SurfaceGraph, Aside | None]:
         """Answer one question after the other; not again where the graph is the same, or has no more loops."""
-        evidence = Evidence.of(skeleton, surface)
+        evidence, aside = Evidence.of(skeleton, surface), None
         decisions: dict[str, list[Decision]] = {about: [] for about in ANSWERS}
         settled: dict[str, Skeleton] = {}  # what each question was last asked about
         n_handles = 0
         for about in ORDER_OF_QUESTIONS:
             n_handles = min(n_handles, skeleton.n_loops)  # cuts may have opened some
-            if settled.get(about) is skeleton or (about == "loop" and skeleton.n_loops <= n_handles):
+            if settled.get(about) is skeleton or not _may_be_asked(skeleton):
+                continue
+            if about == "surface":
+                settled[about] = skeleton
+                if aside is None and (aside := Aside.of(skeleton, Tracer().surface)):
+                    skeleton = aside.rest()
+                    evidence = Evidence.of(skeleton)
+                continue
+            if about == "loop" and skeleton.n_loops <= n_handles:
                 continue
             skeleton, found = self._asked(about, skeleton, evidence)
             decisions[about] = _changed(decisions[about]) + found
@@ -135,7 +149,7 @@ class Refiner(Filter[Skeleton]):
             n_cuts=len(_changed(decisions["air"])),
             n_bridges=len(_changed(decisions["gap"])),
         )
-        return with_fields(skeleton, report=report)
+        return with_fields(skeleton, report=report), evidence, aside
 
     def _asked(self, about: str, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Decision]]:
         """A skeleton after a question was answered for its parts, with the curve fitted anew if it was changed."""
@@ -149,6 +163,10 @@ class Refiner(Filter[Skeleton]):
         if self.spacing:
             skeleton = subdivide_edges(skeleton, self.spacing)
         return fit_axis(skeleton, self.recentre, surface)
+
+
+def _may_be_asked(skeleton: Skeleton) -> bool:
+    return len(skeleton.edges) > 0 and len(skeleton.supporting_points) > 0
 
 
 def _changed(decisions: list[Decision]) -> list[Decision]:

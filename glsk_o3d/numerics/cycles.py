@@ -1,11 +1,13 @@
 """Cycles of a graph embedded in space, and how wide they open."""
 
+from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from .groups import group_sum
 from .paths import maximal_paths
 from .vectors import TINY, dot
 
@@ -26,13 +28,43 @@ def minimum_cycle_basis(n: int, edges: np.ndarray, lengths: np.ndarray) -> list[
     return [np.array(vertices) for _, vertices in sorted(cycles, key=lambda cycle: cycle[0])]
 
 
-def edges_on_cycles(n: int, edges: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Whether each edge is on a cycle, (e,) bool array, and no bridge; all as in `minimum_cycle_basis`."""
-    cycles = minimum_cycle_basis(n, edges, lengths)
-    pairs = [np.column_stack([cycle, np.roll(cycle, -1)]) for cycle in cycles]
-    low, high = np.sort(np.concatenate([np.empty((0, 2), int), *pairs]), axis=1).T
-    first, second = np.sort(edges, axis=1).T
-    return np.isin(first * n + second, low * n + high)
+def edges_on_cycles(n: int, edges: np.ndarray) -> np.ndarray:
+    """Whether each edge is on a cycle, (e,) bool array, and no bridge, in a graph as in `minimum_cycle_basis`.
+
+    An edge that is in no spanning tree closes a cycle with the ways in it from both of its ends to where they meet. Of
+    these all edges are contracted, so that none is walked twice.
+    """
+    around: list[list[tuple[int, int]]] = [[] for _ in range(n)]
+    for edge, (a, b) in enumerate(edges.tolist()):
+        around[a].append((b, edge))
+        around[b].append((a, edge))
+    depth, above, closing = [-1] * n, [(-1, -1)] * n, []
+    for root in range(n):
+        if depth[root] >= 0:
+            continue
+        depth[root], front = 0, [root]
+        for here in front:
+            for there, edge in around[here]:
+                if depth[there] < 0:
+                    depth[there], above[there] = depth[here] + 1, (here, edge)
+                    front.append(there)
+                elif edge != above[here][1]:
+                    closing.append((here, there, edge))
+    on, merged = np.zeros(len(edges), bool), list(range(n))
+
+    def top(v: int) -> int:
+        while merged[v] != v:
+            merged[v] = v = merged[merged[v]]
+        return v
+
+    for a, b, edge in closing:
+        on[edge] = True
+        while (a := top(a)) != (b := top(b)):
+            if depth[a] < depth[b]:
+                a, b = b, a
+            merged[a], edge = above[a]
+            on[edge] = True
+    return on
 
 
 def _cyclic_chains(n: int, edges: np.ndarray, lengths: np.ndarray) -> list[Chain]:
@@ -65,14 +97,16 @@ def _horton(chains: list[Chain]) -> list[Chain]:
     component = len({int(np.argmax(np.isfinite(row))) for row in distance})
     rank = len(chains) - m + component
 
+    ahead, masks = before.tolist(), [{root: 0} for root in range(m)]
+
     def path(root: int, v: int) -> int:
         """Chains on the shortest path, as a bit mask."""
-        mask = 0
-        while v != root:
-            u = int(before[root, v])
-            mask |= 1 << shortest[u, v]
-            v = u
-        return mask
+        known, walk = masks[root], [v]
+        while walk[-1] not in known:
+            walk.append(ahead[root][walk[-1]])
+        for far, near in pairwise(walk[::-1]):
+            known[near] = known[far] | 1 << shortest[far, near]
+        return known[v]
 
     # Candidates: a chain, closed by the shortest paths from a root to its two ends.
     totals = distance[:, ends[:, 0]] + distance[:, ends[:, 1]] + lengths
@@ -147,10 +181,17 @@ def _flattened(
 
 
 def _grid(places: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Of the grid of the coordinates of some places (n, 2) what is inside of edges from a to b, (g, 3) float array."""
-    x, y = np.meshgrid(*places.T)
-    grid = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
-    return grid[_inside(grid, a, b)]
+    """Of the grid of the coordinates of some places (n, 2) what is inside of edges from a to b, (g, 3) float array.
+
+    A place is inside if an odd number of edges cross its row beyond it.
+    """
+    x, y = places.T
+    row, edge = np.nonzero((a[:, 1] > y[:, None]) != (b[:, 1] > y[:, None]))
+    (start, low), (stop, high) = a[edge, :2].T, b[edge, :2].T
+    crossing = (stop - start) * (y[row] - low) / (high - low) + start
+    beyond = group_sum((x < crossing[:, None]).astype(float), row, len(y))
+    row, column = np.nonzero(beyond % 2)
+    return np.column_stack([x[column], y[row], np.zeros(len(row))])
 
 
 def _distance(points: np.ndarray, polygon: np.ndarray, after: np.ndarray) -> np.ndarray:
@@ -164,12 +205,3 @@ def _distance(points: np.ndarray, polygon: np.ndarray, after: np.ndarray) -> np.
     share = np.clip(along / squared, 0, 1)
     apart += share * (share * squared - 2 * along)
     return np.sqrt(np.maximum(apart.min(axis=1), 0))
-
-
-def _inside(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Even-odd test in the first two coordinates, with the edges from a to b."""
-    x, y = points[:, :1], points[:, 1:2]
-    rises = (a[:, 1] > y) != (b[:, 1] > y)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        crossing = (b[:, 0] - a[:, 0]) * (y - a[:, 1]) / (b[:, 1] - a[:, 1]) + a[:, 0]
-    return ((rises & (x < crossing)).sum(axis=1) % 2).astype(bool)

@@ -107,7 +107,7 @@ class Handles:
     def _looped(self) -> set[tuple[int, int]]:
         """The edges of loops, in both directions."""
         edges = self.skeleton.edges
-        looped = edges_on_cycles(len(self._width), edges, np.maximum(self.skeleton.edge_lengths, TINY))
+        looped = edges_on_cycles(len(self._width), edges)
         return {(a, b) for i, j in edges[looped].tolist() for a, b in ((i, j), (j, i))}
 
     def on_loop(self, path: np.ndarray) -> bool:

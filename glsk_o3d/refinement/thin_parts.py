@@ -5,6 +5,7 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from ..numerics.cycles import edges_on_cycles
 from ..numerics.eigen import largest_eigenvalue
 from ..numerics.grid_sampling import SAMPLED_POINTS, sample_cloud
 from ..numerics.groups import component_labels, first_in_their_place, group_sum
@@ -79,6 +80,13 @@ def may_lack_surface(skeleton: Skeleton, least: float) -> bool:
     owner, m = skeleton.vertex_of_point[skeleton.vertex_of_point >= 0], len(skeleton.vertices)
     count = np.bincount(owner, minlength=m) / max(len(owner) / SAMPLED_POINTS, 1)
     return bool(count[skeleton.confidence < UNSURE_CONFIDENCE].sum() > (1 - least) * min(REGION_POINTS, count.sum()))
+
+
+def mostly_on_loops(skeleton: Skeleton, thin: np.ndarray) -> bool:
+    """Whether most of some vertices are on loops, as in a frame of thin bars: from its root, paths would open all."""
+    edges = skeleton.edges
+    looped = edges_on_cycles(len(thin), edges)
+    return bool(2 * thin[np.unique(edges[looped])].sum() > thin.sum())
 
 
 def one_direction(normals: np.ndarray, links: csr_matrix) -> np.ndarray:

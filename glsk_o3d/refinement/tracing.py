@@ -5,21 +5,21 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
-from ..numerics.cycles import edges_on_cycles
 from ..numerics.groups import component_labels, group_median
 from ..numerics.near_links import LINK_SPACINGS, join_pieces, linked, slice_centres, steps
 from ..numerics.polylines import incident_edges, nearest_on_edges, places_on_edges
-from ..numerics.vectors import TINY, dot, norm, unit
+from ..numerics.vectors import dot, norm, unit
 from ..skeleton import NOT_MEASURED, Skeleton
 from .merging import merge_into
 from .rooted import numbered_from, root_among
-from .thin_parts import SpacedPoints, without_surface
+from .thin_parts import SpacedPoints, mostly_on_loops, without_surface
 
 # All fitted, on trees whose twigs are thinner than their points are far apart; s is the median scale of the points.
 SLICE_WIDTH = 0.5  # of geodesic distance, over s
@@ -46,7 +46,7 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
     thin = np.zeros(m, bool)
     if surface and m:
         thin = without_surface(cloud, surface)
-    if m == 0 or (root is None and (not thin.any() or _mostly_on_loops(skeleton, thin))):
+    if m == 0 or (root is None and (not thin.any() or mostly_on_loops(skeleton, thin))):
         return skeleton
     mixed, joined = _Mixed.of(skeleton, cloud, thin).joined(anywhere=root is not None)
     ends = skeleton.leaves[~thin[skeleton.leaves]]
@@ -68,13 +68,6 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
         traced = numbered_from(traced, int(np.searchsorted(stays, paths.index[roots[0]])))
         report = replace(report, root=tuple(traced.vertices[0].tolist()))
     return replace(traced, normals=np.where(loose[:, None], np.nan, skeleton.normals), report=report)
-
-
-def _mostly_on_loops(skeleton: Skeleton, thin: np.ndarray) -> bool:
-    """Whether most of some vertices are on loops, as in a frame of thin bars: from its root, paths would open all."""
-    edges = skeleton.edges
-    looped = edges_on_cycles(len(thin), edges, np.maximum(skeleton.edge_lengths, TINY))
-    return bool(2 * thin[np.unique(edges[looped])].sum() > thin.sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,34 +236,54 @@ def drop_spurious(
     stays = np.arange(len(skeleton.vertices))
     scatter = math.sqrt(math.log2(max(int((skeleton.vertex_of_point >= 0).sum()), 1)))
     while True:
-        forks, tips, twigs = _twigs(skeleton, traced, root)
-        if not twigs:
+        forks, tips, body, twig = _twigs(skeleton, traced, root)
+        if not len(tips):
             return skeleton, stays
-        rest = np.setdiff1d(np.arange(len(traced)), np.concatenate(twigs))
+        rest = np.delete(np.arange(len(traced)), body)
         away, nearest = cKDTree(skeleton.vertices[rest]).query(skeleton.vertices[tips])
         beside = rest[nearest]
         beyond = away - np.where(traced[beside], scatter, radii) * skeleton.radii[beside]
         order = np.argsort(beyond)
         # of each fork the least, since the others may be what is left of the limb
         order = order[np.unique(forks[order], return_index=True)[1]]
-        chosen = order[beyond[order] < 0].tolist()
-        if not chosen:
+        chosen = order[beyond[order] < 0]
+        if not len(chosen):
             return skeleton, stays
-        group = np.arange(len(traced))
-        for twig in chosen:
-            group[twigs[twig]] = forks[twig]
+        group, gone = np.arange(len(traced)), np.isin(twig, chosen)
+        group[body[gone]] = forks[twig[gone]]
         left = np.unique(group)
+        root = None if root is None else int(np.searchsorted(left, root))
         skeleton, traced, stays = merge_into(skeleton, group), traced[left], stays[left]
         skeleton = replace(skeleton, radii=np.where(traced, spread_around(skeleton), skeleton.radii))
 
 
-def _twigs(skeleton: Skeleton, traced: np.ndarray, root: int | None) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
-    """Of traced branches that end the junction that they leave, their tip, and their vertices but for the junction."""
-    found = []
-    for path in skeleton.branches:
-        path = path[::-1] if skeleton.degree[path[0]] == 1 else path
-        if skeleton.degree[path[0]] > 2 and skeleton.degree[path[-1]] == 1 and traced[path[1:]].all():
-            found.append(path)
-    found = [path for path in found if root not in path[1:]]
-    forks, tips = np.array([(path[0], path[-1]) for path in found], int).reshape(-1, 2).T
-    return forks, tips, [path[1:] for path in found]
+class _Twigs(NamedTuple):
+    """Branches that end: where they fork off and their tips, and of every vertex of theirs, which it is and whose."""
+
+    forks: np.ndarray
+    tips: np.ndarray
+    body: np.ndarray
+    twig: np.ndarray
+
+
+def _twigs(skeleton: Skeleton, traced: np.ndarray, root: int | None) -> _Twigs:
+    """Traced branches that end, up to the junctions that they leave."""
+    degree, free, beside = skeleton.degree, traced.copy(), np.zeros(len(traced), int)
+    if root is not None:
+        free[root] = False
+    np.bitwise_xor.at(beside, skeleton.edges, skeleton.edges[:, ::-1])  # of two neighbours, to know one from the other
+    tips = np.flatnonzero((degree == 1) & free)
+    here, forks, which = tips, np.full(len(tips), -1), np.arange(len(tips))
+    before, vertices, twig = np.zeros(len(tips), int), [tips[:0]], [which[:0]]
+    while len(here):
+        vertices.append(here)
+        twig.append(which)
+        here, before = beside[here] ^ before, here
+        at_fork = degree[here] > 2
+        forks[which[at_fork]] = here[at_fork]
+        on = (degree[here] == 2) & free[here]
+        here, before, which = here[on], before[on], which[on]
+    some = forks >= 0
+    body, owner = np.concatenate(vertices), np.concatenate(twig)
+    left = some[owner]
+    return _Twigs(forks[some], tips[some], body[left], (np.cumsum(some) - 1)[owner[left]])

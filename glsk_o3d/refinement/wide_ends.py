@@ -71,8 +71,10 @@ def _levelled(skeleton: Skeleton, run: np.ndarray, surface: SurfaceGraph) -> Ske
     neck = np.flatnonzero(np.isin(vertex[rows], run[:2]))
     if not len(neck):
         return skeleton
-    pairs = np.column_stack([np.repeat(np.arange(len(vertex)), k), surface.neighbours.ravel()])
-    away = dijkstra(linked(surface.points, pairs)[rows][:, rows], indices=neck, min_only=True)
+    index = np.full(len(vertex), -1)
+    index[rows] = np.arange(len(rows))
+    pairs = np.column_stack([np.repeat(np.arange(len(rows)), k), index[surface.neighbours[rows]].ravel()])
+    away = dijkstra(linked(surface.points[rows], pairs[pairs[:, 1] >= 0]), indices=neck, min_only=True)
     reached, n = np.isfinite(away), len(run) - 2
     if reached.mean() < MAJORITY:  # a bridge joins them, and no surface
         return skeleton

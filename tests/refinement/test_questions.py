@@ -9,9 +9,9 @@ from glsk_o3d import Connector, Contractor, Report, pipelines, samples, skeleton
 from glsk_o3d.numerics.cycles import minimum_cycle_basis
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
 from glsk_o3d.numerics.winding import AREA_NEIGHBOURS
-from glsk_o3d.refinement import spurs
+from glsk_o3d.refinement import loops, spurs
 from glsk_o3d.refinement.evidence import LEAST_INSIDE, Evidence
-from glsk_o3d.refinement.loops import CLEAR_SIGHT, WIDE_OPEN, loop_facts
+from glsk_o3d.refinement.loops import CLEAR_SIGHT, WIDE_OPEN, WIDEST_FIRST, loop_facts
 from glsk_o3d.samples.capsules import union_sample
 
 X, Y, Z = np.eye(3)
@@ -67,6 +67,22 @@ def facts_of_the_loop(ring):
 
 def passage_of(ring):
     return np.exp(facts_of_the_loop(ring)["passage"]) - 0.3
+
+
+@pytest.mark.parametrize("lines", [TORUS, LADDER], ids=["torus", "ladder"])
+def test_the_widest_sights_are_enough_to_find_the_passage(piped, monkeypatch, lines):
+    """Other places are only asked about if they could be better."""
+    ring, asked, winding = piped(lines), list[int](), Evidence.winding
+    monkeypatch.setattr(Evidence, "winding", lambda self, places: asked.append(len(places)) or winding(self, places))
+    cycles, found = minimum_cycle_basis(len(ring.vertices), ring.edges, ring.edge_lengths), []
+    for first in (1, WIDEST_FIRST, 10**6):
+        monkeypatch.setattr(loops, "WIDEST_FIRST", first)
+        asked.clear()
+        facts = [loop.facts for loop in loop_facts(ring, cycles, Evidence.of(ring))]
+        found.append((facts, sum(asked)))
+    (one, _), (some, few), (every, all_places) = found
+    assert one == some == every
+    assert few < 0.7 * all_places
 
 
 @pytest.mark.parametrize(("height", "clear"), [(None, True), (0.6, False), (1.5, True)])

@@ -61,6 +61,12 @@ def test_what_has_a_surface_stays_and_so_does_the_root():
     assert drop(short, root=41) is short  # inside the twig
 
 
+def test_the_root_stays_the_root_when_others_before_it_go():
+    left = drop(limb((20, SCATTER), (20, -1.2 * SCATTER), (20, 1.5 * SCATTER)), root=46)
+    assert len(left.leaves) == 3
+    assert left.vertices[:, 1].max() == 1.5 * SCATTER
+
+
 @pytest.mark.slow
 def test_noise_as_wide_as_twigs_makes_few_false_tips():
     """Beside the root and 16 true ones fewer than half of those that there are without the rule: the mean of trees."""
