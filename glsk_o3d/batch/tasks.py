@@ -18,9 +18,9 @@ import numpy as np
 from .. import __version__
 from ..analysis.summary import summary
 from ..errors import GlskError, InvalidCloudError, in_words
-from ..io.scans import read_cloud
+from ..io.scans import read_scan
 from ..io.skeletons import read_skeleton, save_skeleton
-from ..io.streaming import sample_for
+from ..io.streaming import points_for
 from ..recipes import from_recipe
 from ..report import Report
 from ..skeleton import Skeleton
@@ -78,8 +78,7 @@ def _skeletonize(task: Task, row: Row, messages: list[str]) -> None:
         skeleton = _of_tile(task)
     else:
         pipeline = from_recipe(task.recipe)
-        sample = sample_for(pipeline, task.path, task.where)  # of many points
-        skeleton = pipeline(read_cloud(task.path, where=task.where) if sample is None else sample)
+        skeleton = pipeline(points_for(pipeline, task.path, task.where))
     messages += skeleton.report.warnings
     facts = summary(skeleton, 0.0).items()
     row |= {name: None if isinstance(value, float) and not math.isfinite(value) else value for name, value in facts}
@@ -93,12 +92,12 @@ def _skeletonize(task: Task, row: Row, messages: list[str]) -> None:
 
 def _of_tile(task: Task) -> Skeleton:
     """The skeleton of a tile, without its points; one without vertices, if these are too few or no curve is in them."""
-    cloud = read_cloud(task.path)
+    points = read_scan(task.path).positions
     none = np.empty((0, 3))
     try:
-        skeleton: Skeleton = from_recipe(task.recipe)(cloud)
+        skeleton: Skeleton = from_recipe(task.recipe)(points)
     except InvalidCloudError as error:
-        report = Report(n_input=len(cloud.points)).with_warning(f"no skeleton in this tile: {error}")
+        report = Report(n_input=len(points)).with_warning(f"no skeleton in this tile: {error}")
         return Skeleton(none, np.empty((0, 2)), np.empty(0), np.empty(0), none, none, report)
     return replace(skeleton, points=none, normals=none, vertex_of_point=np.empty(0))
 

@@ -41,9 +41,9 @@ def skeletonize(
     Everything that can be checked is checked before the computation starts. Files appear complete or not at all. Of
     files with more than ten million points only a sample is read.
     """
-    from .. import annotate_file, read_cloud
+    from .. import annotate_file
     from ..interop.packages import require
-    from ..io.streaming import LABELLED_ENDING, sample_for
+    from ..io.streaming import LABELLED_ENDING, points_for
     from ..resampling import with_support
     from .overrides import choose
 
@@ -62,10 +62,7 @@ def skeletonize(
         require("matplotlib")  # for the colours of branches
     with progress() as update:
         update(f"reading {scan.name}")
-        cloud = sample_for(chosen, scan, where)
-        if cloud is None:
-            cloud = read_cloud(scan, where=where)
-        skeleton, seconds = _run(chosen, cloud, update)
+        skeleton, seconds = _run(chosen, points_for(chosen, scan, where), update)
         if support is not None:
             comparing = "comparing with the skeleton of sample {} of {}"
             skeleton = with_support(skeleton, chosen, support, on_draw=lambda *n: update(comparing.format(*n), *n))

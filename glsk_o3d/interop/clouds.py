@@ -72,13 +72,16 @@ def cloud_points(cloud: Any) -> np.ndarray:
 def cloud_counts(cloud: Any, finite: np.ndarray) -> tuple[np.ndarray | None, int, int]:
     """How many points of a larger cloud each of the `finite` points, (N,) bool array, of a sample stands for.
 
-    (n,) float array, the attribute ``sample_count`` of a tensor cloud, None if there is none; and two ints, the sums
-    for the finite points and for all others. InvalidCloudError if they are no counts.
+    (n,) float array, the attribute ``sample_count`` of a tensor cloud or a Scan, None if there is none; and two ints,
+    the sums for the finite points and for all others. InvalidCloudError if they are no counts.
     """
-    name, tensor = open3d_class(cloud)
-    if not (name == "PointCloud" and tensor and SAMPLE_COUNT in cloud.point):
+    if open3d_class(cloud) == ("PointCloud", True):
+        held = cloud.point[SAMPLE_COUNT].cpu().numpy() if SAMPLE_COUNT in cloud.point else None
+    else:
+        held = getattr(cloud, "attributes", {}).get(SAMPLE_COUNT)
+    if held is None:
         return None, int(finite.sum()), int((~finite).sum())
-    counts, n = cloud.point[SAMPLE_COUNT].cpu().numpy().astype(float), len(cloud.point.positions)
+    counts, n = held.astype(float), len(finite)
     if not (counts.shape in ((n, 1), (n,)) and (counts >= 1).all() and counts.sum() <= MOST_COUNTED):
         raise InvalidCloudError(
             f"the cloud's attribute {SAMPLE_COUNT} of shape {counts.shape} must be the number of points that each "

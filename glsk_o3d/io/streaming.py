@@ -11,7 +11,6 @@ from ..analysis.segmentation import vertex_of_cloud
 from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ..interop.atomic import check_ending, write_atomically
 from ..interop.clouds import SAMPLE_COUNT
-from ..interop.packages import import_open3d
 from ..numerics.frame import not_finite
 from ..numerics.grid_sampling import sample_blocks
 from ..pipeline import Pipeline
@@ -20,7 +19,7 @@ from ..skeleton import Skeleton
 from .annotation import labels
 from .formats import ply
 from .scan import COLOR_CHANNELS, Scan
-from .scans import promised_points, read_blocks
+from .scans import promised_points, read_blocks, read_scan
 
 LABELLED_ENDING = ".ply"
 LARGE_CLOUD = 10_000_000  # measured: points that in memory take 1.4 GB, and in blocks half of that
@@ -67,7 +66,9 @@ def read_sample(
     if n is not None and (isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1):
         raise InvalidParameterError(f"n = {n!r}: must be an int of at least 1")
     size = Sampler().sample_size if n is None else lambda total: int(n)
-    return _cloud(*_sampled(path, size, where, drop_invalid)[:2])
+    points, counts, _ = _sampled(path, size, where, drop_invalid)
+    counts = np.minimum(counts, np.iinfo(np.int32).max).astype(np.int32)
+    return Scan(points, attributes={SAMPLE_COUNT: counts}).to_tensor()
 
 
 def _sampled(
@@ -100,29 +101,24 @@ def _sampled(
     return points, counts, dropped
 
 
-def _cloud(points: np.ndarray, counts: np.ndarray) -> Any:
-    o3d = import_open3d()
-    cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(points))
-    cloud.point[SAMPLE_COUNT] = o3d.core.Tensor(np.minimum(counts, np.iinfo(np.int32).max)[:, None].astype(np.int32))
-    return cloud
+def points_for(pipeline: Pipeline[Any], path: str | os.PathLike[str], where: str | None = None) -> Any:
+    """What a pipeline takes of a file, without Open3D: its (N, 3) points, or a Scan with the sample of them.
 
-
-def sample_for(pipeline: Pipeline[Any], path: str | os.PathLike[str], where: str | None = None) -> Any | None:
-    """The sample of a file that a pipeline takes of its points, as from `read_sample`, where that is worth while.
-
-    That is where the file has more than ten million points and the pipeline does not take all; else None, and all is to
-    be read. Where the pipeline drops points that are not finite, the last one is NaN and stands for them, so that its
-    report counts them.
+    The sample, as of `read_sample`, is taken where the file has more than ten million points and the pipeline does not
+    take all. Where the pipeline drops points that are not finite, the last one is NaN and stands for them, so that its
+    report counts them. Errors are those of `read_cloud`.
     """
     sampler = pipeline.stages[0]
-    if not isinstance(sampler, Sampler) or sampler.sample_size(LARGE_CLOUD) >= LARGE_CLOUD:
-        return None
-    if (promised_points(path) or 0) <= LARGE_CLOUD:
-        return None
+    if (
+        not isinstance(sampler, Sampler)
+        or sampler.sample_size(LARGE_CLOUD) >= LARGE_CLOUD
+        or (promised_points(path) or 0) <= LARGE_CLOUD
+    ):
+        return read_scan(path, where).positions
     points, counts, dropped = _sampled(path, sampler.sample_size, where, sampler.drop_invalid)
     if dropped:
         points, counts = np.append(points, np.full((1, 3), np.nan), axis=0), np.append(counts, dropped)
-    return _cloud(points, counts)
+    return Scan(points, attributes={SAMPLE_COUNT: counts})
 
 
 def annotate_file(

@@ -85,5 +85,5 @@ def test_a_file_that_may_not_be_read_is_one_line(refused, tmp_path, monkeypatch)
     def refuse(path, where):
         raise PermissionError(13, "Permission denied", str(path))
 
-    monkeypatch.setattr("glsk_o3d.io.scans.read_scan", refuse)
+    monkeypatch.setattr("glsk_o3d.io.streaming.read_scan", refuse)
     assert refused(1, "skeletonize", "s.xyz", "-o", "o.json") == "s.xyz: Permission denied"

@@ -100,7 +100,7 @@ def test_points_that_are_not_finite(tmp_path, points, monkeypatch):
     pipeline = pipelines.default().with_options(drop_invalid=True)
     whole = pipeline(read_cloud(path))
     monkeypatch.setattr(streaming, "LARGE_CLOUD", N - 1)
-    found = pipeline(streaming.sample_for(pipeline, path))
+    found = pipeline(streaming.points_for(pipeline, path))
     for report in (whole.report, found.report):
         assert (report.n_input, report.n_dropped) == (N, 10)
     assert found.report.n_sampled == whole.report.n_sampled == len(found.points) - 1
@@ -120,13 +120,15 @@ def test_points_that_are_not_finite(tmp_path, points, monkeypatch):
 
 
 def test_large_files_are_sampled_and_others_are_read(scans, monkeypatch):
-    path, sample_for = scans / "scan.ply", streaming.sample_for
+    path, points_for = scans / "scan.ply", streaming.points_for
     n = (read_tensor_cloud(path).point.classification.numpy() == 5).sum()
-    assert sample_for(pipelines.default(), path) is None
+    whole = np.asarray(read_cloud(path).points)
+    np.testing.assert_array_equal(points_for(pipelines.default(), path), whole)
     monkeypatch.setattr(streaming, "LARGE_CLOUD", N - 1)
-    sample = sample_for(pipelines.default(), path, "classification == 5")
-    assert int(sample.point.sample_count.numpy().sum()) == n < N
-    assert sample_for(pipelines.wen2024(), path) is None
+    sample = points_for(pipelines.default(), path, "classification == 5")
+    assert sample.attributes["sample_count"].sum() == n < N
+    assert pipelines.default()(sample).report.n_input == n
+    np.testing.assert_array_equal(points_for(pipelines.wen2024(), path), whole)
 
 
 # -------------------------------------------------------------------------------------------------------------- labels
