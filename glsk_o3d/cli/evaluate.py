@@ -34,15 +34,15 @@ def evaluate(
     1 is best. The comparison is with a truth: how far is it from the true axis, in radii? 0 is best of error, ends and
     radius error, 1 of the others; components, loops, leaves and junctions are more, or fewer, than it has.
     """
-    from .. import read_cloud, read_skeleton, read_truth
+    from .. import read_skeleton, read_truth
     from ..analysis import assess, compare
-    from ..interop.clouds import cloud_points
+    from ..io.scans import read_scan
 
     with progress() as update:
         update(f"reading {skeleton.name}")
         curve = read_skeleton(skeleton)
         axis = read_truth(truth) if truth is not None else None
-        points = curve.points if cloud is None else cloud_points(read_cloud(cloud))
+        points = curve.points if cloud is None else read_scan(cloud).positions
         if not len(points):
             raise WrongUsage(f"{skeleton}: holds no cloud, as json and npz files of a run do: give the CLOUD, too")
         update("measuring")

@@ -43,10 +43,12 @@ def _cloud_facts(file: Path, where: str | None) -> dict[str, Any]:
     Lengths are in the cloud's units. A large cloud is read in blocks, which say nothing of duplicates and the spacing.
     """
     import numpy as np
-    from scipy.spatial import KDTree
 
     from ..io.scans import promised_points, read_blocks, read_scan
     from ..io.streaming import LARGE_CLOUD
+    from ..numerics.groups import first_in_their_place
+    from ..numerics.morton import morton_order
+    from ..numerics.neighbourhoods import nearest_neighbours
 
     large = (promised_points(file) or 0) > LARGE_CLOUD
     n, lost, ends = 0, 0, []
@@ -59,8 +61,11 @@ def _cloud_facts(file: Path, where: str | None) -> dict[str, Any]:
             known[name] = _together(known.get(name, {}), values)
     whole: dict[str, Any] = {}
     if not large:
-        distinct = np.unique(finite, axis=0)
-        spacing = np.median(KDTree(distinct).query(distinct, k=2)[0][:, 1]) if len(distinct) > 1 else np.nan
+        distinct = finite[first_in_their_place(finite)]
+        spacing = np.nan
+        if len(distinct) > 1:
+            ordered = distinct[morton_order(distinct)]  # the tree is quicker with what is near in turn
+            spacing = np.median(nearest_neighbours(ordered, 2)[0][:, 1])
         whole = {"triangles": len(block.triangles) or None, "duplicates": len(finite) - len(distinct)}
         whole["median_spacing"] = float(spacing)  # to the nearest other point
     low, high = (np.min(ends, axis=0), np.max(ends, axis=0)) if ends else (np.full(3, np.nan),) * 2

@@ -6,6 +6,7 @@ from heapq import heappop, heappush
 import numpy as np
 
 from ..decisions import QUESTIONS, Decision
+from ..numerics.groups import quantile
 from ..numerics.polylines import place_at
 from ..numerics.vectors import TINY
 from ..skeleton import Skeleton
@@ -57,8 +58,8 @@ def branch_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[np.nd
     vertices, edges, m = skeleton.vertices, skeleton.edges, len(skeleton.vertices)
     length = np.maximum(skeleton.edge_lengths, TINY)
     winding = evidence.winding_along(skeleton)
-    typical = np.median(winding)
-    scatter = 1.4826 * np.median(np.abs(winding - typical)) + LEAST_SCATTER * abs(typical)
+    typical = quantile(winding)
+    scatter = 1.4826 * quantile(np.abs(winding - typical)) + LEAST_SCATTER * abs(typical)
     along = evidence.surface_around(skeleton)
     tubes = 2 * np.pi * np.maximum(skeleton.radii[edges].mean(axis=1), TINY) @ length
     area = along.sum()
@@ -81,7 +82,7 @@ def branch_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[np.nd
             bonded = crossings(_sides(branch, around, m), len(branch), bonds, closed=False)[:-1]
         edge = numbers(branch)
         # of a line, which has no thickness, what rounding leaves
-        radius = max(float(np.median(skeleton.radii[branch])), float(np.finfo(float).eps * length.sum()), TINY)
+        radius = max(quantile(skeleton.radii[branch]), float(np.finfo(float).eps * length.sum()), TINY)
         ends = np.append(0, np.cumsum(length[edge]))
         amounts = winding[edge] * length[edge], along[edge]
         smooth, areas = _window_means(ends, ends[1:] - length[edge] / 2, AIR_WINDOW * radius, *amounts)

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
 from ..decisions import QUESTIONS, Decision
+from ..numerics.groups import quantile
 from ..numerics.near_links import linked
 from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import TINY, dot, norm
@@ -61,7 +62,7 @@ def gap_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[tuple[in
     ends = list(_ends(skeleton))
     if not ends or not len(evidence.points):
         return
-    typical = float(np.median(evidence.winding_along(skeleton)))
+    typical = quantile(evidence.winding_along(skeleton))
     if typical < LEAST_INSIDE:
         return  # parts too thin to have an inside, which could go on across a gap
     leaves = [end.leaf for end in ends]
@@ -109,7 +110,7 @@ def _cap(end: _End, evidence: Evidence) -> float:
 def _ends(skeleton: Skeleton) -> Iterator[_End]:
     """Leaves, with the directions in which their branches end, and the median radii of these."""
     for branch in skeleton.branches:
-        radius = float(np.median(skeleton.radii[branch]))
+        radius = quantile(skeleton.radii[branch])
         for path in (branch, branch[::-1]):
             if skeleton.degree[path[0]] == 1 and radius > 0:
                 places = skeleton.vertices[path]

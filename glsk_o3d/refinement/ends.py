@@ -96,12 +96,12 @@ def _grow(cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int,
     along = arc_lengths(places)
     last = _last(cloud, path, along, first, other)
     length = along[last]
-    run, cut, way = _within(along, length, END_SIZE * np.median(radii)), len(path), np.zeros(3)
+    run, cut, way = _within(along, length, END_SIZE * quantile(radii)), len(path), np.zeros(3)
     late = (length - along <= half_widths) & (other | (along >= half_widths))
     late[last + 1 :] = True
     stop = np.clip(along[np.argmax(late)] if late.any() else length, length / 2, length)
     for _ in range(2):  # how far the points reach is seen along a run that is no part of the cap itself
-        radius, wide = np.median(radii[run]), np.median(half_widths[run])
+        radius, wide = quantile(radii[run]), quantile(half_widths[run])
         start = max(stop - AXIS_LENGTH * radius, 0)
         way, anchor = _way(places, along, start, stop), place_at(places, along, stop)
         # the points of a junction are other limbs', too
@@ -114,7 +114,7 @@ def _grow(cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int,
         cut = max(close[0] if len(close) else len(path), first)
         stop = along[cut - 1]
         run = _within(along, stop, END_SIZE * radius)
-    radius, anchor = np.median(radii[run]), places[cut - 1]
+    radius, anchor = quantile(radii[run]), places[cut - 1]
     if stop > radius / 2:  # of a stub there is no run: it goes on as it was
         way = _way(places, along, max(stop - AXIS_LENGTH * radius, 0), stop)
     own = cloud.members.of(path[max(cut - 2, 0 if other else min(1, len(path) - 1)) :])
@@ -126,7 +126,7 @@ def _grow(cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int,
     behind = _within(along, stop, END_SIZE * radius)
     tip = end.tip(_Taper.of(along[behind] - stop, radii[behind], radius))
     steps = np.diff(along[run])
-    step = np.median(steps) if len(steps) else length / last
+    step = quantile(steps) if len(steps) else length / last
     tip = max(tip, step / 2)
     # edges of no length are those of no limb
     number = max(round(min(tip / max(step, TINY), len(points))), 1)
@@ -307,8 +307,8 @@ def _replanted(skeleton: Skeleton, grown: list[_Grown]) -> Skeleton:
         keep[gone] = False
         chain = np.concatenate([path[cut - 1 : cut], names])
         edges.append(np.column_stack([chain[:-1], chain[1:]]))
-        radii.append(np.full(len(places), np.median(skeleton.radii[run])))
-        confidence.append(np.full(len(places), np.median(skeleton.confidence[run])))
+        radii.append(np.full(len(places), quantile(skeleton.radii[run])))
+        confidence.append(np.full(len(places), quantile(skeleton.confidence[run])))
         lost = members.of(gone)
         near = cKDTree(np.concatenate([skeleton.vertices[chain[:1]], places])).query(skeleton.points[lost])[1]
         owner[lost] = chain[near]

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from ..decisions import QUESTIONS, Decision
 from ..numerics.cycles import inscribed_circle, minimum_cycle_basis, places_inside
-from ..numerics.groups import component_labels, group_rank
+from ..numerics.groups import component_labels, group_rank, quantile
 from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import TINY
 from ..skeleton import Skeleton
@@ -88,12 +88,12 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
     if not cycles:
         return []
     surface = VertexPoints(skeleton).distance
-    tubes = [max(float(np.median(surface[cycle])), TINY) for cycle in cycles]
+    tubes = [max(quantile(surface[cycle]), TINY) for cycle in cycles]
     bonds, spacing = evidence.bonds(skeleton), max(evidence.spacing, TINY)
     loops = [skeleton.vertices[cycle] for cycle in cycles]
     views = [_View(loop, tube, evidence) for loop, tube in zip(loops, tubes, strict=True)]
     along = np.split(evidence.winding(np.concatenate(loops)), np.cumsum([len(loop) for loop in loops[:-1]]))
-    medians = [float(np.median(numbers)) for numbers in along]
+    medians = [quantile(numbers) for numbers in along]
     falls = _falls(views, np.array(medians), evidence)
     found = []
     for cycle, tube, view, inside, fall in zip(cycles, tubes, views, medians, falls, strict=True):
@@ -103,7 +103,7 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
         facts = dict(
             opening=float(np.log(min(view.radius / spacing, WIDE_OPEN) + 0.5)),
             passage=float(np.log(passage + 0.3)),
-            bonds=float(np.log(crossing.min() / max(np.median(crossing), TINY) + 0.1)),
+            bonds=float(np.log(crossing.min() / max(quantile(crossing), TINY) + 0.1)),
         )
         narrow = view.radius < WIDE_LOOP * tube
         found.append(LoopEvidence(facts, inside, narrow, view.centre, int(np.argmin(crossing))))

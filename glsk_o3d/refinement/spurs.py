@@ -142,7 +142,7 @@ def _outside(vertices: np.ndarray, path: np.ndarray, surface: float, wide: np.nd
     body = path[1:]
     away = norm(vertices[body] - vertices[path[0]])
     part = body[np.flatnonzero(away <= surface).max(initial=-1) + 1 :]
-    return part if len(part) and away[-1] - surface > LONG_OUTSIDE * np.median(wide[part]) else body
+    return part if len(part) and away[-1] - surface > LONG_OUTSIDE * quantile(wide[part]) else body
 
 
 def _with_forks(skeleton: Skeleton, twigs: list[_Twig]) -> list[_Twig]:
