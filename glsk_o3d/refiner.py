@@ -86,6 +86,11 @@ class Refiner(Filter[Skeleton]):
     limb: float = parameter(
         0.25, "Least probability that a branch is a limb; others, spurs, are pruned. 0 keeps all.", low=0, high=1
     )
+    set_aside: bool = parameter(
+        True,
+        "Leave parts without a surface to a Tracer if they have most points of a large skeleton. False judges them, "
+        "too, as does handle = 0.",
+    )
     spacing: float = parameter(0.5, "Longest edge over the local radius, by subdivision; 0 leaves the edges.", low=0)
     recentre: int = parameter(
         1,
@@ -131,9 +136,10 @@ class Refiner(Filter[Skeleton]):
                 continue
             if about == "surface":
                 settled[about] = skeleton
-                if aside is None and (aside := Aside.of(skeleton, Tracer().surface)):
+                if self.set_aside and self.handle and not aside and (aside := Aside.of(skeleton, Tracer().surface)):
                     skeleton = aside.rest()
-                    evidence = Evidence.of(skeleton)
+                    surface = SurfaceGraph.of(skeleton)
+                    evidence = Evidence.of(skeleton, surface) if _may_be_asked(skeleton) else evidence
                 continue
             if about == "loop" and skeleton.n_loops <= n_handles:
                 continue
@@ -149,7 +155,7 @@ class Refiner(Filter[Skeleton]):
             n_cuts=len(_changed(decisions["air"])),
             n_bridges=len(_changed(decisions["gap"])),
         )
-        return with_fields(skeleton, report=report), evidence, aside
+        return with_fields(skeleton, report=report), surface, aside
 
     def _asked(self, about: str, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Decision]]:
         """A skeleton after a question was answered for its parts, with the curve fitted anew if it was changed."""

@@ -1,7 +1,7 @@
 """The points of anything that carries points; Open3D is imported when it is first needed, never for an array."""
 
 import os
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,6 +25,13 @@ class Cloud:
     >>> Sampler.consumes is Cloud
     True
     """
+
+
+class CountedPoints(NamedTuple):
+    """A sample without Open3D: points, and how many points of a larger cloud each of them stands for."""
+
+    points: np.ndarray  # (N, 3)
+    counts: np.ndarray  # (N,)
 
 
 def cloud_points(cloud: Any) -> np.ndarray:
@@ -55,7 +62,7 @@ def cloud_points(cloud: Any) -> np.ndarray:
         raise InvalidCloudError(f"a cloud is not a file name ({cloud!r}): read it first with glsk_o3d.read_cloud")
     if isinstance(cloud, np.ma.MaskedArray):
         raise InvalidCloudError("a cloud cannot be a masked array: drop the masked points, or fill them with NaN")
-    held = _held(cloud)
+    held = cloud.points if isinstance(cloud, CountedPoints) else _held(cloud)
     try:
         array = np.asarray(held)
     except Exception as error:  # ragged lists, and whatever a foreign __array__ raises
@@ -72,13 +79,13 @@ def cloud_points(cloud: Any) -> np.ndarray:
 def cloud_counts(cloud: Any, finite: np.ndarray) -> tuple[np.ndarray | None, int, int]:
     """How many points of a larger cloud each of the `finite` points, (N,) bool array, of a sample stands for.
 
-    (n,) float array, the attribute ``sample_count`` of a tensor cloud or a Scan, None if there is none; and two ints,
-    the sums for the finite points and for all others. InvalidCloudError if they are no counts.
+    (n,) float array, the attribute ``sample_count`` of a tensor cloud, or those of CountedPoints, None if there are
+    none; and two ints, the sums for the finite points and for all others. InvalidCloudError if they are no counts.
     """
     if open3d_class(cloud) == ("PointCloud", True):
         held = cloud.point[SAMPLE_COUNT].cpu().numpy() if SAMPLE_COUNT in cloud.point else None
     else:
-        held = getattr(cloud, "attributes", {}).get(SAMPLE_COUNT)
+        held = cloud.counts if isinstance(cloud, CountedPoints) else None
     if held is None:
         return None, int(finite.sum()), int((~finite).sum())
     counts, n = held.astype(float), len(finite)

@@ -43,10 +43,6 @@ class Scan:
     def __len__(self) -> int:
         return len(self.positions)
 
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        """The positions: filters take a scan as they take them."""
-        return np.array(self.positions, dtype, copy=copy)
-
     def __getitem__(self, rows: np.ndarray) -> Scan:
         """Some of the points, without triangles."""
         return replace(

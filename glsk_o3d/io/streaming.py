@@ -10,7 +10,7 @@ import numpy as np
 from ..analysis.segmentation import vertex_of_cloud
 from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ..interop.atomic import check_ending, write_atomically
-from ..interop.clouds import SAMPLE_COUNT
+from ..interop.clouds import SAMPLE_COUNT, CountedPoints
 from ..numerics.frame import not_finite
 from ..numerics.grid_sampling import sample_blocks
 from ..pipeline import Pipeline
@@ -102,7 +102,7 @@ def _sampled(
 
 
 def points_for(pipeline: Pipeline[Any], path: str | os.PathLike[str], where: str | None = None) -> Any:
-    """What a pipeline takes of a file, without Open3D: its (N, 3) points, or a Scan with the sample of them.
+    """What a pipeline takes of a file: its (N, 3) points, or a sample of them; without Open3D, but of OBJ and STL.
 
     The sample, as of `read_sample`, is taken where the file has more than ten million points and the pipeline does not
     take all. Where the pipeline drops points that are not finite, the last one is NaN and stands for them, so that its
@@ -118,7 +118,7 @@ def points_for(pipeline: Pipeline[Any], path: str | os.PathLike[str], where: str
     points, counts, dropped = _sampled(path, sampler.sample_size, where, sampler.drop_invalid)
     if dropped:
         points, counts = np.append(points, np.full((1, 3), np.nan), axis=0), np.append(counts, dropped)
-    return Scan(points, attributes={SAMPLE_COUNT: counts})
+    return CountedPoints(points, counts)
 
 
 def annotate_file(

@@ -1,6 +1,5 @@
 """Cycles of a graph embedded in space, and how wide they open."""
 
-from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -97,16 +96,14 @@ def _horton(chains: list[Chain]) -> list[Chain]:
     component = len({int(np.argmax(np.isfinite(row))) for row in distance})
     rank = len(chains) - m + component
 
-    ahead, masks = before.tolist(), [{root: 0} for root in range(m)]
-
     def path(root: int, v: int) -> int:
         """Chains on the shortest path, as a bit mask."""
-        known, walk = masks[root], [v]
-        while walk[-1] not in known:
-            walk.append(ahead[root][walk[-1]])
-        for far, near in pairwise(walk[::-1]):
-            known[near] = known[far] | 1 << shortest[far, near]
-        return known[v]
+        mask = 0
+        while v != root:
+            u = int(before[root, v])
+            mask |= 1 << shortest[u, v]
+            v = u
+        return mask
 
     # Candidates: a chain, closed by the shortest paths from a root to its two ends.
     totals = distance[:, ends[:, 0]] + distance[:, ends[:, 1]] + lengths

@@ -79,7 +79,7 @@ def join_pieces(places: np.ndarray, links: csr_matrix, longest: np.ndarray) -> t
         if len(ends) == 0:
             break
         ahead = np.maximum(dot(outward[ends[:, 0]], way), -dot(outward[ends[:, 1]], way)) / np.maximum(length, TINY)
-        fresh = ends[_spanning(piece, ends, length * (2 - np.maximum(ahead, 0)))]
+        fresh = ends[spanning(piece, ends, length * (2 - np.maximum(ahead, 0)))]
         added = np.concatenate([added, fresh])
         piece = component_labels(int(piece.max()) + 1, piece[fresh])[piece]
     row, column = links.nonzero()
@@ -101,8 +101,8 @@ def steps(links: csr_matrix) -> csr_matrix:
     return step
 
 
-def _spanning(piece: np.ndarray, ends: np.ndarray, length: np.ndarray) -> np.ndarray:
-    """Of links between pieces those of a minimum spanning tree."""
+def spanning(piece: np.ndarray, ends: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """Of links (e, 2) between pieces, (n,) int array, which are those of minimum spanning trees, int array."""
     m = int(piece.max()) + 1
     low, high = np.sort(piece[ends], axis=1).T
     order = np.lexsort((length, high, low))

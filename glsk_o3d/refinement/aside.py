@@ -6,10 +6,10 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial import cKDTree
 
-from ..numerics.near_links import linked
+from ..numerics.near_links import spanning
+from ..numerics.vectors import norm
 from ..skeleton import OF_VERTICES, Skeleton
 from .air import CROSSING_HOPS
 from .diagnostics import MAJORITY
@@ -55,17 +55,17 @@ class Aside(NamedTuple):
         whole, gone, m = self.whole, self.gone, len(rest.vertices)
         number = m - 1 + np.cumsum(gone)
         ends = whole.edges[gone[whole.edges].any(axis=1)]
-        inner = gone[ends].all(axis=1)
-        ties, stays = number[ends[~inner]], ~gone[ends[~inner]]
+        ties, stays = number[ends], ~gone[ends]
+        if stays.any():
+            ties[stays] = cKDTree(rest.vertices).query(whole.vertices[ends[stays]])[1]
+        piece = np.append(rest.component_of_vertex, rest.n_components + np.arange(gone.sum()))
         if len(ties):
-            ties[stays] = cKDTree(rest.vertices).query(whole.vertices[ends[~inner][stays]])[1]
-        forest = np.column_stack(minimum_spanning_tree(linked(whole.vertices, ends[inner])).nonzero())
-        edges = np.concatenate([rest.edges, number[forest], ties])
+            ties = ties[spanning(piece, ties, norm(whole.vertices[ends[:, 1]] - whole.vertices[ends[:, 0]]))]
         owner = np.where(whole.vertex_of_point >= 0, number[whole.vertex_of_point], -1)
         owner[self.rows] = rest.vertex_of_point
         aside, made = some_vertices(whole, gone), dict[str, Any](points=whole.points, normals=whole.normals)
         made |= {name: np.concatenate([getattr(rest, name), aside[name]]) for name in ("vertices", *OF_VERTICES)}
-        return replace(rest, **made, edges=np.unique(np.sort(edges, axis=1), axis=0), vertex_of_point=owner)
+        return replace(rest, **made, edges=np.concatenate([rest.edges, ties]), vertex_of_point=owner)
 
 
 def _most(cloud: SpacedPoints, some: np.ndarray) -> bool:

@@ -126,7 +126,7 @@ def test_large_files_are_sampled_and_others_are_read(scans, monkeypatch):
     np.testing.assert_array_equal(points_for(pipelines.default(), path), whole)
     monkeypatch.setattr(streaming, "LARGE_CLOUD", N - 1)
     sample = points_for(pipelines.default(), path, "classification == 5")
-    assert sample.attributes["sample_count"].sum() == n < N
+    assert sample.counts.sum() == n < N
     assert pipelines.default()(sample).report.n_input == n
     np.testing.assert_array_equal(points_for(pipelines.wen2024(), path), whole)
 

@@ -15,14 +15,8 @@ ALL = ("vertices", "radii", "confidence", "half_width", "half_thickness", "suppo
 @pytest.fixture(scope="module")
 def crown():
     """Before it is refined, with all that is asked about it."""
-    asked, look = [], Aside.of
-
-    def watch(*args):
-        asked.append(look(*args))
-        return asked[-1]
-
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(Aside, "of", watch)
+        asked = seen(patched)
         refined = skeletonize(samples.tree(4096, forks=6).points)
     return refined, asked[0]
 
@@ -90,26 +84,94 @@ def grid(n):
 def test_what_is_mostly_on_loops_is_not_set_aside():
     net = grid(24)
     assert Aside.of(net, 0.65) is None
-    comb = net.edges[(np.diff(net.edges)[:, 0] == 1) | (net.edges[:, 0] % 24 == 0)]
-    assert Aside.of(replace(net, edges=comb), 0.65).gone.all()
+    assert Aside.of(comb(), 0.65).gone.all()
 
 
 def test_small_skeletons_are_not_set_aside():
-    net = grid(12)
-    comb = net.edges[(np.diff(net.edges)[:, 0] == 1) | (net.edges[:, 0] % 12 == 0)]
-    assert Aside.of(replace(net, edges=comb), 0.65) is None
+    assert Aside.of(comb(12), 0.65) is None
 
 
-def test_nothing_may_be_left():
-    """Of a comb of lines without a surface, and a skeleton comes back."""
-    net = grid(24)
-    comb = replace(net, edges=net.edges[(np.diff(net.edges)[:, 0] == 1) | (net.edges[:, 0] % 24 == 0)])
-    back = Aside.of(comb, 0.65).put_back(Aside.of(comb, 0.65).rest())
-    np.testing.assert_array_equal(back.edges, comb.edges)
-    np.testing.assert_array_equal(back.vertices, comb.vertices)
-    refined = Refiner()(comb)
-    assert (len(refined.vertices), refined.n_components, refined.n_loops) == (24 * 24, 1, 0)
-    assert Tracer()(refined).report.n_traced == len(comb.points)
+def comb(n=24, more=()):
+    """Lines without a surface that hang on one, and perhaps more links between them."""
+    net = grid(n)
+    edges = net.edges[(np.diff(net.edges)[:, 0] == 1) | (net.edges[:, 0] % n == 0)]
+    return replace(net, edges=np.concatenate([edges, np.reshape(more, (-1, 2)).astype(int)]))
+
+
+def seen(monkeypatch):
+    """What is set aside from now on."""
+    found, look = [], Aside.of
+
+    def watch(*args):
+        found.append(look(*args))
+        return found[-1]
+
+    monkeypatch.setattr(Aside, "of", watch)
+    return found
+
+
+def test_nothing_may_be_left(monkeypatch):
+    lines, found = comb(), seen(monkeypatch)
+    refined = Refiner(recentre=0)(lines)
+    assert found[0].gone.all()
+    np.testing.assert_array_equal(refined.edges, lines.edges)
+    np.testing.assert_array_equal(refined.vertices, lines.vertices)
+    assert Tracer()(refined).report.n_traced == len(lines.points)
+
+
+@pytest.mark.parametrize("recentre", [0, 1])
+@pytest.mark.parametrize("edges", [[], [(576, 577)]], ids=["no edges", "no normals"])
+def test_of_what_is_left_nothing_may_be_asked(monkeypatch, recentre, edges):
+    """A vertex that is sure and has no edge, or an edge whose points have no normals."""
+    lines, found, rng = comb(), seen(monkeypatch), np.random.default_rng(0)
+    turn, up = 2 * np.pi * rng.random(1500), rng.random(1500)
+    normals = np.column_stack([np.cos(turn), np.sin(turn), 0 * turn])
+    points = 30 + normals + up[:, None] * [0, 0, 4]
+    more = 2
+    whole = replace(
+        lines,
+        vertices=np.concatenate([lines.vertices, np.full((more, 3), 30.0) + [[0, 0, 1], [0, 0, 3]]]),
+        edges=np.concatenate([lines.edges, np.reshape(edges, (-1, 2)).astype(int)]),
+        points=np.concatenate([lines.points, points]),
+        normals=np.concatenate([lines.normals, np.where(len(edges), np.nan, normals)]),
+        vertex_of_point=np.concatenate([lines.vertex_of_point, 576 + (up > 0.5)]),
+        **{name: np.append(getattr(lines, name), [0.1] * more) for name in ("radii", "half_width", "half_thickness")},
+        confidence=np.append(lines.confidence, [1.0] * more),
+        support=np.full(578, np.nan),
+    )
+    refined = Refiner(recentre=recentre)(whole)
+    assert np.isfinite(refined.vertices).all()
+    assert refined.n_components >= 2
+    if not recentre:
+        assert found[0].gone.sum() == 576
+
+
+def test_points_without_a_vertex_have_none_afterwards():
+    lines = comb()
+    owner = np.where(np.arange(len(lines.points)) % 7, lines.vertex_of_point, -1)
+    aside = Aside.of(replace(lines, vertex_of_point=owner), 0.65)
+    np.testing.assert_array_equal(aside.put_back(aside.rest()).vertex_of_point, owner)
+
+
+def test_a_loop_is_opened_unless_all_are_to_be_kept():
+    lines = comb(more=[(5 * 24 + 20, 6 * 24 + 20)])
+    assert lines.n_loops == 1
+    assert Refiner(recentre=0)(lines).n_loops == 0
+    assert Refiner(recentre=0, handle=0, limb=0)(lines).n_loops == 1
+
+
+def test_a_crown_does_not_hang_on_the_order_of_points(crown):
+    refined, _ = crown
+    order = np.random.default_rng(0).permutation(len(refined.points))
+    again = skeletonize(refined.points[order])
+    for name in ("vertices", "edges", "radii"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(refined, name))
+    np.testing.assert_array_equal(again.vertex_of_point, refined.vertex_of_point[order])
+
+
+def test_all_can_be_judged(monkeypatch):
+    monkeypatch.setattr(Aside, "of", lambda *_: pytest.fail("asked"))
+    assert len(Refiner(set_aside=False)(comb()).edges)
 
 
 def test_without_questions_nothing_is_set_aside(monkeypatch):
