@@ -21,8 +21,11 @@ SPACING_POINTS = 100_000  # precision: points whose nearest others say the spaci
 def info(file: Annotated[Path, argument("FILE", "A cloud, mesh or skeleton.")], where: Where = None) -> None:
     """Say what is in a cloud or skeleton file."""
     from ..analysis.summary import ITERATION_COLUMNS, iteration_rows
-    from ..io.skeletons import holds_skeleton, read_skeleton
+    from ..io.paths import SCAN_ENDINGS, unknown_ending
+    from ..io.skeletons import FORMATS, holds_skeleton, read_skeleton
 
+    if file.is_file() and file.suffix.lower() not in (known := dict.fromkeys((*SCAN_ENDINGS, *FORMATS))):
+        raise unknown_ending(file, known)
     if holds_skeleton(file):
         skeleton = read_skeleton(file)
         facts, records = _skeleton_facts(skeleton), skeleton.report.iterations

@@ -157,3 +157,10 @@ def test_files_instead_of_a_window(invoke, scans, shown, tmp_path, y):
         assert f"<title>{file.name}</title>" in (tmp_path / "r.html").read_text("utf-8")
         assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
     assert shown == []
+
+
+def test_an_unknown_ending_names_those_of_clouds_and_skeletons(refused, tmp_path):
+    (tmp_path / "cloud.npy").write_bytes(b"")
+    message = refused(1, "info", "cloud.npy")
+    assert message.startswith("cloud.npy: unknown ending; known are .")
+    assert {".xyz", ".ply", ".las", ".swc"} <= set(message.replace(",", "").split())
