@@ -62,7 +62,7 @@ def cloud_points(cloud: Any) -> np.ndarray:
         raise InvalidCloudError(f"a cloud is not a file name ({cloud!r}): read it first with glsk_o3d.read_cloud")
     if isinstance(cloud, np.ma.MaskedArray):
         raise InvalidCloudError("a cloud cannot be a masked array: drop the masked points, or fill them with NaN")
-    held = cloud.points if isinstance(cloud, CountedPoints) else _held(cloud)
+    held = _held(cloud)
     try:
         array = np.asarray(held)
     except Exception as error:  # ragged lists, and whatever a foreign __array__ raises
@@ -100,6 +100,8 @@ def cloud_counts(cloud: Any, finite: np.ndarray) -> tuple[np.ndarray | None, int
 
 def _held(cloud: Any) -> Any:
     """The array-like in an Open3D object, or `cloud` itself; knows Open3D's classes by name, so as not to import it."""
+    if isinstance(cloud, CountedPoints):
+        return cloud.points
     name, tensor = open3d_class(cloud)
     if name == "Tensor":
         return cloud.cpu().numpy()
