@@ -14,6 +14,7 @@ from .interop.clouds import cloud_counts, cloud_points, to_point_cloud
 from .numerics.frame import Frame, not_finite, to_working_frame
 from .numerics.grid_sampling import sample_cloud
 from .numerics.neighbourhoods import principal, row_medians
+from .numerics.rows import reach_next_rows
 from .numerics.vectors import TINY, Ints, finite_rows
 from .report import Report
 
@@ -121,7 +122,8 @@ class Points(Representatives):
     representative : (m,) int array
         The survivor (0 .. n-1) that each distinct point was merged into; itself for a survivor.
     neighbours : (n, k) int array
-        The nearest survivors of each, nearest first after the point itself.
+        The nearest survivors of each, nearest first after the point itself; as many as reach into the next rows where
+        points lie in rows, such as scan lines.
     spread : (n, 3) float64 array
         Sums of squares along the principal axes of these neighbourhoods, ascending.
     ring_normals : (n, 3) float64 array
@@ -249,6 +251,7 @@ class Points(Representatives):
 
 def _measured(cloud: np.ndarray, neighbours: np.ndarray) -> dict[str, Any]:
     """Rows that all survive, with what their neighbourhoods are like, as fields of `Points`."""
+    neighbours = reach_next_rows(cloud, neighbours)
     spread, normals = principal(cloud, neighbours)
     everybody = np.arange(len(cloud))
     return dict(

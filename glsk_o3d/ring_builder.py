@@ -1,7 +1,7 @@
 """RingBuilder: points -> one-rings (Wen et al. 2024, section II-A)."""
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from .numerics.neighbourhoods import nearest_neighbours, plane_axes, principal
 from .numerics.rings import star_rings
 from .parameters import documented, parameter, resolve_length
 from .pipeline import Filter, Watch
-from .points import Points, default_k
+from .points import Points
 from .state import Contraction, at_rest
 
 LEAST_RING = 3  # derived: neighbours that a radius leaves, at least
@@ -53,7 +53,8 @@ class RingBuilder(Filter[Contraction]):
     k: int | Literal["auto", "published"] = parameter(
         "auto",
         "Neighbours per point, itself included; at most all. More bridge noise and gaps, fewer keep thin parts apart. "
-        "'auto' is 8 to 16 and 'published' 8 to 30, by the number of points.",
+        "'auto' is 8 to 16, or as many as reach into the next rows of a scan, and 'published' 8 to 30, by the number of "
+        "points.",
         type="int",
         unit="points",
         low=4,
@@ -92,10 +93,10 @@ class RingBuilder(Filter[Contraction]):
 
     def _neighbourhoods(self, points: Points, cloud: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The neighbours of every point but itself, (n, k - 1), and the unit normals of their planes, (n, 3)."""
-        n, given = len(cloud), self.k
-        k: Any = {"auto": default_k, "published": published_k}[given](n) if isinstance(given, str) else given
-        k = min(k, n)
-        if k == points.neighbours.shape[1]:
+        known = points.neighbours.shape[1]
+        k = {"auto": known, "published": published_k(len(cloud))}[self.k] if isinstance(self.k, str) else self.k
+        k = min(k, len(cloud))
+        if k == known:
             return points.neighbours[:, 1:], points.ring_normals
         neighbours = nearest_neighbours(cloud, k)[1]
         return neighbours[:, 1:], principal(cloud, neighbours)[1]

@@ -9,6 +9,7 @@ from scipy.sparse import csr_array
 from .numerics.eigen import principal_parts
 from .numerics.neighbourhoods import nearest_left, principal, wide_covariances
 from .numerics.pairing import Pairs, merge_pairs
+from .numerics.rows import reach_next_rows
 from .numerics.vectors import TINY, norm
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
@@ -94,6 +95,7 @@ def _merged(points: Points, representative: np.ndarray) -> Points:
     """What is left when survivors are merged into others."""
     kept, here = representative == np.arange(len(representative)), points.cloud[points.survivors]
     neighbours = nearest_left(here, points.neighbours, kept, default_k(int(kept.sum())))
+    neighbours = reach_next_rows(here[kept], neighbours)
     spread, normals = principal(here[kept], neighbours)
     return points.merged_into(representative, neighbours=neighbours, spread=spread, ring_normals=normals)
 

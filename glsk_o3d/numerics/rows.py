@@ -1,0 +1,44 @@
+"""Points in rows: scan lines, lidar rings and slices, much nearer along a row than from one row to the next."""
+
+import numpy as np
+
+from .eigen import principal_parts
+from .neighbourhoods import nearest_neighbours, scatter
+from .vectors import TINY, norm
+
+ROW_PLACES = 500  # speed: places at which rows are looked for
+ROW_DIMENSION = 1.5  # derived: halfway between a curve and a surface
+MOST_REACHED = 8  # speed: times as many neighbours as usual, at most
+NEXT_ROWS = 2.0  # derived: times as many neighbours as a row alone has: 1.15 times as far as the next row, both see it
+
+
+def reach_next_rows(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
+    """The neighbours (n, k) of points, or more of them, (n, K), where rows would hide the surface.
+
+    Within a distance r a row has in the order of r points, a surface r^2: where k neighbours grow as along a curve, more
+    are looked at. If most of these neighbourhoods are planar (Demantke et al. 2011, "Dimensionality based scale
+    selection in 3D lidar point clouds"), the points lie in rows on a surface; those of twigs are not. K is the number
+    at which there are twice as many neighbours as on the row alone.
+    """
+    n, k = neighbours.shape
+    places = np.arange(0, n, max(n // ROW_PLACES, 1))
+    few = max(k // 4, 2)
+    if n <= k:
+        return neighbours
+    near, far = (norm(points[neighbours[places, each]] - points[places]) for each in (few, k - 1))
+    if np.median(near * ((k - 1) / few) ** (1 / ROW_DIMENSION) - far) > 0:
+        return neighbours
+    distance, around = nearest_neighbours(points, min(MOST_REACHED * k, n), of=points[places])
+    if not any(_mostly_planar(points, around[:, : k * 2**each]) for each in range(4)):
+        return neighbours
+    on_row = 2 * distance / np.maximum(distance[:, 2:3], TINY)
+    reached = np.arange(distance.shape[1]) >= NEXT_ROWS * on_row
+    reached[:, :k], reached[:, -1] = False, True
+    return nearest_neighbours(points, int(np.median(reached.argmax(axis=1))) + 1)[1]
+
+
+def _mostly_planar(points: np.ndarray, neighbours: np.ndarray) -> bool:
+    """Whether most neighbourhoods are rather planar than linear or scattered."""
+    third, second, first = np.sqrt(np.maximum(principal_parts(scatter(points, neighbours))[0], 0))
+    planar = second - third > np.maximum(first - second, third)
+    return bool(2 * np.count_nonzero(planar) > len(planar))
