@@ -106,8 +106,8 @@ class Points(Representatives):
     representative_of_point : (N,) int array
         Row of `cloud` of each input point; -1 if it is not finite.
     outlier, sampled : (N,) bool array
-        Outliers, which the nearest distinct point represents; and points that determine the surface: no outliers, and
-        only the sample of a large cloud.
+        Outliers, which the nearest distinct point represents; and points that determine the surface: no outliers, one
+        of copies, and only the sample of a large cloud.
     frame : Frame
     cloud : (m, 3) float64 array
         Distinct input points; noisy ones denoised, and where there are many, means of several.
@@ -188,9 +188,9 @@ class Points(Representatives):
         `place` (N,) is the position in `kept` of what stands for each input point, -1 for none. `neighbours` (s, k), if
         they are known, are positions in `kept` that are all distinct.
         """
-        frame, cloud, row, weight, neighbours = to_working_frame(points[kept], counts, by, default_k, neighbours)
+        frame, cloud, first, row, weight, neighbours = to_working_frame(points[kept], counts, by, default_k, neighbours)
         sampled = np.zeros(len(points), bool)
-        sampled[kept] = True
+        sampled[kept[first]] = True
         return cls(
             points=points,
             representative_of_point=np.append(row, -1)[place],
@@ -214,12 +214,9 @@ class Points(Representatives):
         left = position[first]
         place = np.where(aside, -1, self._of_points(left))
         place[kept] = np.arange(len(kept))
-        by, known = ("box" if self.frame.mean is None else "spread"), None
-        if len(kept) == np.count_nonzero(~gone):  # copies in a frame that far ones made wide may be none in their own
-            rows, known = left[~gone], np.empty_like(neighbours)
-            known[rows] = rows[neighbours]
-        weight = np.ones(len(kept))
-        weight[left[~gone]] = self.weight[~gone]
+        by = "box" if self.frame.mean is None else "spread"
+        rows, known, weight = left[~gone], np.empty_like(neighbours), np.empty(len(kept))
+        known[rows], weight[rows] = rows[neighbours], self.weight[~gone]
         points = self._of_rows(self.points, kept, place, weight, by, self.report, known)
         nearest = np.full(len(gone), -1)
         nearest[gone] = cKDTree(points.cloud).query(points.frame.into(self.points[first[gone]]))[1]

@@ -86,7 +86,7 @@ class Contraction(Representatives):
         """Input points that tell where the surface is, (s,) int array.
 
         Those of every place that had a ring, since these are evenly apart; and all where there is noise, or was before
-        they were averaged, since it is their mean. Of copies all, since one would be chosen by chance.
+        they were averaged, since it is their mean.
         """
         several = np.bincount(self.representative_of_point[self.sampled], minlength=len(self.cloud)) > 1
         some = self.sampled & (self._of_points((self.noise > 0) | several) > 0)

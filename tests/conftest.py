@@ -198,7 +198,8 @@ def assert_sound():
         lengths = np.linalg.norm(skeleton.normals[skeleton.supporting_points], axis=1)
         np.testing.assert_allclose(lengths, 1, atol=1e-12)
         report, silent = skeleton.report, np.isnan(skeleton.normals).any(axis=1)
-        said = n_dropped + report.n_outliers
+        copies = 0 if report.is_sampled else n_points - n_dropped - report.n_outliers - report.n_distinct
+        said = n_dropped + report.n_outliers + copies
         if report.n_traced:  # there is no surface
             assert max(said, report.n_traced) <= silent.sum()
         else:

@@ -220,12 +220,46 @@ def test_warns_of_what_is_as_thick_as_long(kind):
     assert [text.partition(":")[0] for text in run(cloud, "default").report.warnings] == ["sphere-like"]
 
 
-@pytest.mark.parametrize("name", ["wen2024", "cao2010"])
-def test_duplicates_change_nothing_but_the_centres(name):
+@pytest.mark.parametrize("name", [*pipelines.PIPELINES])
+def test_copies_count_once(name):
     single, doubled = run(TORUS, name), run(SOUND["every point twice"], name)
-    np.testing.assert_allclose(doubled.vertices, single.vertices, atol=1e-12)
-    np.testing.assert_array_equal(doubled.edges, single.edges)
+    assert_equal_curves(doubled, single)
     np.testing.assert_array_equal(doubled.vertex_of_point, np.repeat(single.vertex_of_point, 2))
+
+
+@pytest.mark.parametrize("case", ["a tenth twice", "all three times, shuffled", "forty times in one place"])
+def test_copies_of_some_points_count_once(case):
+    """Of a body with a surface, of a crown whose parts are traced, and of noise."""
+    rng = np.random.default_rng(0)
+    for cloud in (samples.sauropod(2500).points, samples.tree(3000).points, samples.torus(9000, noise=0.04).points):
+        n = len(cloud)
+        copies = {
+            "a tenth twice": rng.permutation(n)[: n // 10],
+            "all three times, shuffled": rng.permutation(np.repeat(np.arange(n), 2)),
+            "forty times in one place": np.repeat(rng.permutation(n)[:50], 40),
+        }[case]
+        order = rng.permutation(n + len(copies))
+        assert_equal_curves(run(np.concatenate([cloud, cloud[copies]])[order], "default"), run(cloud, "default"))
+
+
+@pytest.mark.parametrize("apart", [1e-15, 1e-14, 1e-11, 1e-8])
+def test_what_is_a_copy_is_said_by_the_spacing(apart):
+    """Copies moved by much less than the points are apart: neither their number nor the graph changes."""
+    rng = np.random.default_rng(0)
+    for cloud in (samples.two_rings(1000).points, samples.sauropod(2500).points):
+        moved = [cloud + apart * rng.normal(size=cloud.shape) for _ in range(4)]
+        several, single = run(np.concatenate([cloud, *moved]), "default"), run(cloud, "default")
+        assert several.report.n_distinct == len(cloud)
+        assert (several.n_components, several.n_loops, len(several.leaves)) == (
+            single.n_components,
+            single.n_loops,
+            len(single.leaves),
+        )
+
+
+def assert_equal_curves(one, other):
+    for name in ("vertices", "edges", "radii"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
 
 @pytest.mark.parametrize("case", PLAIN)

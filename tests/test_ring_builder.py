@@ -6,7 +6,8 @@ from scipy.spatial import Delaunay, cKDTree
 
 from glsk_o3d import Contraction, InvalidParameterError, RingBuilder, samples
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
-from glsk_o3d.ring_builder import default_k, published_k
+from glsk_o3d.points import default_k
+from glsk_o3d.ring_builder import published_k
 
 TORUS = samples.torus(n=600).points
 SHEET = samples.sheet(n=500, bend=0).points

@@ -159,18 +159,6 @@ def test_thinned_clouds_keep_all_points_and_their_mass():
     assert skeleton.n_loops == 1
 
 
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")  # normals are those of the lines
-def test_scan_lines_much_denser_than_they_are_apart_are_a_surface():
-    """The nearest points of each are of its own line, and show no plane; among those that are left they do."""
-    height, turn = np.meshgrid(np.linspace(0, 3, 44), np.linspace(0, 2 * np.pi, 450, endpoint=False))
-    turn = turn + 6 * np.random.default_rng(0).random(44)
-    lines = np.stack([0.3 * np.cos(turn), 0.3 * np.sin(turn), height], axis=-1)
-    found = pipelines.default()(lines.reshape(-1, 3))
-    assert found.report.n_contracted < 3000
-    assert (found.n_components, found.n_loops, len(found.leaves)) == (1, 0, 2)
-
-
 def test_thin_parts_keep_their_points():
     """A thick and a thin tube, equally dense: the thick one is merged, the thin one stays."""
     thick, thin_ = samples.tube(9000, radius=0.3, length=1.5).points, samples.tube(600, radius=0.02, length=1.5).points

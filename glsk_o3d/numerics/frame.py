@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InvalidCloudError
+from .groups import component_labels
 from .morton import morton_order
 from .neighbourhoods import nearest_neighbours
 from .vectors import box, dot, norm
@@ -18,7 +19,8 @@ FLAT_BOX = 0.01  # fitted: least half side of the box for that, over its diagona
 MIN_POINTS = 8  # derived: the least that can have rings of three and a curve
 MIN_EXTENT, MAX_EXTENT = 1e-120, 1e120  # derived: a float64 holds their squares and products
 MIN_STEPS = 1024  # derived: across the cloud, between which coordinates can choose: places in it then have three digits
-SAME_POINT = 4e-15  # derived: a few roundings in the working frame; points nearer than this are duplicates
+ROUNDINGS = 4e-15  # derived: a few roundings in the working frame
+SAME_POINT = 1e-4  # derived: distance of copies over that of the last neighbour; one random pair in 10^8 is as near
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,44 +88,47 @@ def not_finite(n: int, total: int, first: int) -> InvalidCloudError:
 
 def to_working_frame(
     points: np.ndarray, counts: np.ndarray, by: str, k: Callable[[int], int], neighbours: np.ndarray | None = None
-) -> tuple[Frame, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[Frame, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Bring points (n, 3), each of which stands for `counts` (n,), into their working frame, see `Frame.of`.
 
     `k` says how many neighbours to look up for so many points; `neighbours` (n, k), if they are known, are those of
-    points that are all distinct. Returned are the frame; the m distinct points in Morton order (m, 3); for each given
-    point its row among them; how many points each row stands for; and the neighbours of each row. InvalidCloudError if
-    fewer than 8 points are distinct, or if they are so far apart or so near that squares overflow.
+    points that are all distinct. Copies are points much nearer to each other than to others; of each group the first
+    in Morton order stays. Returned are the frame; the m distinct points in Morton order (m, 3); which of the given
+    points they are (m,); for each given point its row among them; how many points each row stands for; and the
+    neighbours of each row. InvalidCloudError if fewer than 8 points are distinct, or if they are so far apart or so
+    near that squares overflow.
     """
     if len(points) < MIN_POINTS:
         raise InvalidCloudError(f"{len(points)} finite points: a skeleton needs at least {MIN_POINTS} distinct ones")
     check_extent(points)
     # In this order from here on: even the last digit of a sum must not depend on how the points were numbered, since
     # on grids it decides between neighbours that are equally near.
-    order = morton_order(points)
-    points, counts = points[order], counts[order]
-    frame = Frame.of(points, by)
-    cloud, row = frame.into(points), np.empty(len(points), int)
-    row[order] = np.arange(len(points))
-    if neighbours is not None:
-        return frame, cloud, row, counts, row[neighbours[order, : k(len(cloud))]]
-    distance, neighbours = nearest_neighbours(cloud, k(len(cloud)))
-    if distance[:, 1].min() >= SAME_POINT:
-        return frame, cloud, row, counts, neighbours
-    cells = np.round(cloud / SAME_POINT).astype(np.int64)
-    first, inverse = np.unique(cells, axis=0, return_index=True, return_inverse=True)[1:]
-    if len(first) < MIN_POINTS:
-        raise InvalidCloudError(
-            f"{len(points)} points but only {len(first)} distinct ones: a skeleton needs at least {MIN_POINTS}"
-        )
-    # Anew: the frame is that of the distinct points, however often they came.
-    distinct = points[first]
-    order = morton_order(distinct)
-    frame = Frame.of(distinct[order], by)
-    position, weight = np.empty(len(first), int), np.zeros(len(first))
-    position[order] = np.arange(len(first))
-    cloud, merged = frame.into(distinct[order]), position[inverse.reshape(-1)]
-    np.maximum.at(weight, merged, counts)
-    return frame, cloud, merged[row], weight, nearest_neighbours(cloud, k(len(cloud)))[1]
+    kept, row = morton_order(points), np.empty(len(points), int)
+    row[kept] = np.arange(len(points))
+    weight = counts[kept]
+    while True:
+        frame = Frame.of(points[kept], by)  # that of the distinct points, however often they came
+        cloud = frame.into(points[kept])
+        if neighbours is not None:
+            return frame, cloud, kept, row, weight, row[neighbours[kept, : k(len(cloud))]]
+        distance, near = nearest_neighbours(cloud, k(len(cloud)))
+        same = distance <= np.maximum(SAME_POINT * distance[:, -1:], ROUNDINGS)
+        same[:, 0] = False
+        if not same.any():
+            return frame, cloud, kept, row, weight, near
+        place, copy = np.nonzero(same)
+        group = component_labels(len(cloud), np.column_stack([place, near[place, copy]]))
+        first, group = np.unique(group, return_index=True, return_inverse=True)[1:]
+        stays = np.zeros(len(cloud), bool)
+        stays[first] = True
+        merged = (np.cumsum(stays) - 1)[first[group]]
+        if len(first) < MIN_POINTS:
+            raise InvalidCloudError(
+                f"{len(points)} points but only {len(first)} distinct ones: a skeleton needs at least {MIN_POINTS}"
+            )
+        most = np.zeros(len(first))
+        np.maximum.at(most, merged, weight)
+        kept, row, weight = kept[stays], merged[row], most
 
 
 def check_extent(points: np.ndarray, n: int | None = None) -> None:

@@ -8,7 +8,7 @@ from .vectors import TINY, norm
 
 ROW_PLACES = 500  # speed: places at which rows are looked for
 ROW_DIMENSION = 1.5  # derived: halfway between a curve and a surface
-MOST_REACHED = 8  # speed: times as many neighbours as usual, at most
+DOUBLINGS = 3  # speed: of the usual number of neighbours, at most
 NEXT_ROWS = 2.0  # derived: times as many neighbours as a row alone has: 1.15 times as far as the next row, both see it
 
 
@@ -21,17 +21,15 @@ def reach_next_rows(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     at which there are twice as many neighbours as on the row alone.
     """
     n, k = neighbours.shape
-    places = np.arange(0, n, max(n // ROW_PLACES, 1))
-    few = max(k // 4, 2)
-    if n <= k:
-        return neighbours
+    places, few = np.arange(0, n, max(n // ROW_PLACES, 1)), max(k // 4, 2)
     near, far = (norm(points[neighbours[places, each]] - points[places]) for each in (few, k - 1))
     if np.median(near * ((k - 1) / few) ** (1 / ROW_DIMENSION) - far) > 0:
         return neighbours
-    distance, around = nearest_neighbours(points, min(MOST_REACHED * k, n), of=points[places])
-    if not any(_mostly_planar(points, around[:, : k * 2**each]) for each in range(4)):
+    distance, around = nearest_neighbours(points, max(min(k << DOUBLINGS, n // 4), k), of=points[places])
+    sizes = k << np.arange(DOUBLINGS + 1)  # more than a quarter of a cloud is no neighbourhood
+    if not any(_mostly_planar(points, around[:, :size]) for size in sizes[sizes <= around.shape[1]]):
         return neighbours
-    on_row = 2 * distance / np.maximum(distance[:, 2:3], TINY)
+    on_row = few * distance / np.maximum(near, TINY)[:, None]
     reached = np.arange(distance.shape[1]) >= NEXT_ROWS * on_row
     reached[:, :k], reached[:, -1] = False, True
     return nearest_neighbours(points, int(np.median(reached.argmax(axis=1))) + 1)[1]

@@ -144,8 +144,7 @@ def on_sample(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skele
     """What a step makes of a skeleton with its surface points alone and, where there are many, fewer of them.
 
     Of every vertex there is a regular sample, so that thin parts keep all. The more of the cloud is noise, the more
-    points are taken, since their mean is what is known of the surface. In the result a point that had a vertex has that
-    of its stand-in, and one that is its own that of the nearest of these points.
+    points are taken, since their mean is what is known of the surface.
     """
     rows, m = skeleton.surface_points, len(skeleton.vertices)
     clean = 1 - skeleton.report.noise
@@ -156,21 +155,37 @@ def on_sample(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skele
         most = max(REFINED_POINTS / clean / np.count_nonzero(count), 2 * VERTEX_POINTS)
         every = np.ceil(count / most).astype(int)
         rows = rows[group_rank(vertex, m) % every[vertex] == 0]
-    if len(rows) == len(skeleton.supporting_points):
-        return step(skeleton)
-    points, vertex = skeleton.points[rows], skeleton.vertex_of_point[rows]
-    made = step(replace(skeleton, points=points, normals=skeleton.normals[rows], vertex_of_point=vertex))
-    owner = np.full(len(skeleton.points), -1)
-    owner[rows] = made.vertex_of_point
+    return on_rows(step, skeleton, rows)
+
+
+def on_distinct(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skeleton:
+    """What a step makes of a skeleton with one point in every place."""
+    rows = np.flatnonzero(skeleton.vertex_of_point >= 0)
+    return on_rows(step, skeleton, rows[first_in_their_place(skeleton.points[rows])])
+
+
+def on_rows(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton, rows: np.ndarray) -> Skeleton:
+    """What a step makes of a skeleton with some of its input points alone, `rows` (n,).
+
+    In the result a point that had a vertex has that of its stand-in, and one that is its own that of the nearest of
+    these points.
+    """
     others = skeleton.vertex_of_point >= 0
     others[rows] = False
     others = np.flatnonzero(others)
+    if not len(others):
+        return step(skeleton)
+    points, vertex = skeleton.points[rows], skeleton.vertex_of_point[rows]
+    made = step(replace(skeleton, points=points, normals=skeleton.normals[rows], vertex_of_point=vertex))
+    owner, normals = np.full(len(skeleton.points), -1), skeleton.normals.copy()
+    owner[rows], normals[rows] = made.vertex_of_point, made.normals
     stand_ins = skeleton.stand_ins[others]
     alone = others[stand_ins == others]
-    alone = alone[morton_order(skeleton.points[alone])]  # the tree is quicker with what is near in turn
-    owner[alone] = made.vertex_of_point[cKDTree(points).query(skeleton.points[alone])[1]]
+    if len(alone):
+        alone = alone[morton_order(skeleton.points[alone])]  # the tree is quicker with what is near in turn
+        owner[alone] = made.vertex_of_point[cKDTree(points).query(skeleton.points[alone])[1]]
     owner[others] = owner[stand_ins]
-    return with_fields(made, points=skeleton.points, normals=skeleton.normals, vertex_of_point=owner)
+    return with_fields(made, points=skeleton.points, normals=normals, vertex_of_point=owner)
 
 
 def in_order(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skeleton:
