@@ -53,8 +53,7 @@ class RingBuilder(Filter[Contraction]):
     k: int | Literal["auto", "published"] = parameter(
         "auto",
         "Neighbours per point, itself included; at most all. More bridge noise and gaps, fewer keep thin parts apart. "
-        "'auto' is 8 to 16, or as many as reach into the next rows of a scan, and 'published' 8 to 30, by the number of "
-        "points.",
+        "'auto' is 8 to 16, more where points lie in rows, and 'published' 8 to 30, by the number of points.",
         type="int",
         unit="points",
         low=4,

@@ -13,7 +13,6 @@ from glsk_o3d import (
     RingBuilder,
     StageError,
     Thinner,
-    pipelines,
     samples,
 )
 from glsk_o3d.denoiser import MOST_IN_ONE, average_noisy

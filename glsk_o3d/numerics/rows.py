@@ -15,8 +15,8 @@ NEXT_ROWS = 2.0  # derived: times as many neighbours as a row alone has: 1.15 ti
 def reach_next_rows(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     """The neighbours (n, k) of points, or more of them, (n, K), where rows would hide the surface.
 
-    Within a distance r a row has in the order of r points, a surface r^2: where k neighbours grow as along a curve, more
-    are looked at. If most of these neighbourhoods are planar (Demantke et al. 2011, "Dimensionality based scale
+    Within a distance r a row has in the order of r points, a surface r^2. Where k neighbours grow as along a curve,
+    more are looked at: if most of their neighbourhoods are planar (Demantke et al. 2011, "Dimensionality based scale
     selection in 3D lidar point clouds"), the points lie in rows on a surface; those of twigs are not. K is the number
     at which there are twice as many neighbours as on the row alone.
     """
