@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from html import escape
 from importlib.metadata import PackageNotFoundError, version
+from string import Formatter
 from typing import Any, get_args, get_origin, get_type_hints
 
 from .decisions import QUESTIONS, Decision, Place, Supported
@@ -81,6 +82,22 @@ def _read(value: Any, hint: Any, name: str = "it") -> Any:
     elif kind is Any or isinstance(value, kind):
         return value
     raise ValueError(f"{name} in its report is {repr(value)[:80]}")
+
+
+class Markup(str):
+    """HTML."""
+
+
+class _Escaping(Formatter):
+    def format_field(self, value: Any, spec: str) -> str:
+        if isinstance(value, list):
+            return "".join(self.format_field(each, spec) for each in value)
+        return value if isinstance(value, Markup) else escape(format(value, spec))
+
+
+def markup(template: str, *values: Any, **named: Any) -> Markup:
+    """HTML of a template, as `str.format` fills it: every value is escaped, but HTML, and each of those in a list."""
+    return Markup(_Escaping().vformat(template, values, named))
 
 
 def warn(messages: Iterable[str]) -> None:
@@ -181,11 +198,11 @@ class Report:
         """What there is to say, in about ten lines; ``repr`` has it all."""
         return "\n".join(["Report", *(f"{name:11} {words}".rstrip() for name, words in self._told())])
 
-    def _repr_html_(self) -> str:
+    def _repr_html_(self) -> Markup:
         cell = '<td style="text-align:left;padding:2px 10px">{}</td>'  # not every notebook has Jupyter's sheet
-        rows = ("".join(cell.format(escape(text)) for text in row) for row in self._told())
-        body = "".join(f"<tr>{row}</tr>" for row in rows)
-        return f'<table style="font:13px/1.5 system-ui,sans-serif;border-collapse:collapse">{body}</table>'
+        rows = [markup("<tr>{}</tr>", [markup(cell, text) for text in row]) for row in self._told()]
+        style = "font:13px/1.5 system-ui,sans-serif;border-collapse:collapse"
+        return markup('<table style="{}">{}</table>', style, rows)
 
     def _told(self) -> list[tuple[str, str]]:
         """The lines, each as a name and what there is to say of it; the warnings come last."""

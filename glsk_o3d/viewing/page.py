@@ -4,9 +4,7 @@ import base64
 import hashlib
 import json
 import os
-import re
 from datetime import datetime, timezone
-from html import escape
 from importlib.resources import files
 from typing import Any
 
@@ -16,6 +14,7 @@ from ..analysis.segmentation import branch_of_edge, branch_of_point, branch_of_v
 from ..interop.atomic import check_ending, write_atomically
 from ..interop.packages import require
 from ..io.colors import shades
+from ..report import Markup, markup
 from ..skeleton import Skeleton
 from . import html as sections
 from .figures import MOST_DRAWN_POINTS, thinned
@@ -64,20 +63,20 @@ def _page(skeleton: Skeleton, title: str) -> str:
     now = datetime.now(timezone.utc).strftime("%d %B %Y, %H:%M UTC")
     thinning = f"The view shows {len(shown):,} of {finite:,} points, drawn at random."
     below = (sections.contraction(report), sections.topology(report), sections.support(report), sections.origin(report))
-    parts = {
-        "title": escape(title),
-        "subtitle": escape(f"{kind} · glsk-o3d {report.versions.get('glsk-o3d', '')} · {now}"),
-        "policy": f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{digest}'",
-        "style": css,
-        "figures": sections.figures(skeleton),
-        "warnings": sections.warnings(report.warnings),
-        "thinning": thinning if len(shown) < finite else "",
-        "sections": "".join(below),
+    return markup(
+        html,
+        title=title,
+        subtitle=f"{kind} · glsk-o3d {report.versions.get('glsk-o3d', '')} · {now}",
+        digest=digest,  # of the one script that may run
+        style=Markup(css),
+        figures=sections.figures(skeleton),
+        warnings=sections.warnings(report.warnings),
+        thinning=thinning if len(shown) < finite else "",
+        sections=list(below),
         # no "<" in it, so that nothing in it can end the script element
-        "data": json.dumps(_data(skeleton, shown), allow_nan=False).replace("<", "\\u003c"),
-        "script": script,
-    }
-    return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], html)
+        data=Markup(json.dumps(_data(skeleton, shown), allow_nan=False).replace("<", "\\u003c")),
+        script=Markup(script),
+    )
 
 
 def _data(skeleton: Skeleton, shown: np.ndarray) -> dict[str, Any]:
