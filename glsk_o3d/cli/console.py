@@ -5,11 +5,13 @@ import math
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
 import typer
+
+from ..interop.atomic import writing
 
 UNBROKEN = 10**5  # more characters than a line of a table has
 
@@ -27,13 +29,16 @@ flags = Flags()
 
 
 def visible(text: str) -> str:
-    """Text with its control characters, but line ends and tabs, written as Python writes them: terminals obey them."""
-    return re.sub(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]", lambda found: repr(found[0])[1:-1], text)
+    """Text with its control characters, but line ends and tabs, written as Python writes them: terminals obey them,
+    and change the order of words at some.
+    """
+    return re.sub(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]", lambda found: repr(found[0])[1:-1], text)
 
 
-def echo(text: str = "", *, err: bool = False) -> None:
-    """Print lines on stdout, or stderr."""
-    typer.echo(visible(text), err=err)
+def echo(text: str = "", **style: Any) -> None:
+    """Print lines on stdout, in a style of `typer.style`; OSError where nobody takes them."""
+    with writing("standard output"):
+        typer.secho(visible(text), **style)
 
 
 def say(kind: str, message: str) -> None:
@@ -41,12 +46,8 @@ def say(kind: str, message: str) -> None:
     color = {"error": "red", "warning": "yellow"}.get(kind)
     prefix = f"glsk: {kind}: " if color else "glsk: "
     plain = False if os.environ.get("NO_COLOR") else None
-    typer.secho(prefix + visible(" ".join(message.split())), err=True, color=plain, fg=color, dim=not color)
-
-
-def heading(text: str) -> None:
-    """Print a bold line on stdout."""
-    typer.secho(visible(text), bold=True)
+    with suppress(OSError):  # where nobody takes even this, the exit code is left
+        typer.secho(prefix + visible(" ".join(message.split())), err=True, color=plain, fg=color, dim=not color)
 
 
 def console(*, stderr: bool = False) -> Any:
@@ -100,7 +101,7 @@ def print_table(rows: Iterable[Sequence[str]], heads: Sequence[str] = (), *, wra
     out = console()
     if not wrap:
         out.width = UNBROKEN
-    with out.capture() as captured:
+    with writing("standard output"), out.capture() as captured:  # rich flushes it
         out.print(table)
     echo("\n".join(line.rstrip() for line in captured.get().removesuffix("\n").split("\n")))
 
@@ -111,7 +112,7 @@ def print_rows(rows: Mapping[str, Any], *, title: str = "") -> None:
     Values that are None or empty are left out; each item of a list has a line.
     """
     if title:
-        heading(title)
+        echo(title, bold=True)
     words = {name.replace("_", " "): value_in_words(value) for name, value in rows.items()}
     print_table(((name, text) for name, text in words.items() if text), wrap=console().file.isatty())
 
@@ -134,7 +135,7 @@ def value_in_words(value: Any) -> str:
 
 def print_json(data: Any) -> None:
     """Print JSON on stdout; numbers that are not finite become null."""
-    typer.echo(json.dumps(_finite(data), indent=2, allow_nan=False, default=str))
+    echo(json.dumps(_finite(data), indent=2, allow_nan=False, default=str))
 
 
 def _finite(data: Any) -> Any:

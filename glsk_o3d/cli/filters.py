@@ -9,7 +9,7 @@ from collections.abc import Callable
 from itertools import chain
 from typing import TYPE_CHECKING, Annotated, Any
 
-from .console import echo, heading, print_table
+from .console import echo, print_table
 from .options import argument
 from .outputs import tell
 from .reporting import WrongUsage
@@ -79,7 +79,7 @@ def _origin(thing: Any) -> dict[str, Any]:
 
 def _print(facts: dict[str, Any], *, full: bool) -> None:
     flow = f"{facts['consumes']} -> {facts['produces']}" if facts["kind"] == "filter" else facts["kind"]
-    heading(f"{facts['name']}  {flow}" + f", from {facts['plugin']}" * bool(facts["plugin"]))
+    echo(f"{facts['name']}  {flow}" + f", from {facts['plugin']}" * bool(facts["plugin"]), bold=True)
     print_table([[facts["doc"] if full else facts["doc"].partition("\n\n")[0]]], wrap=True)
     rows = [("", facts["expression"])] if facts["kind"] == "pipeline" else map(_parameter_row, facts["parameters"])
     print_table(rows, wrap=True)

@@ -4,12 +4,14 @@ Exit codes: 0 all went well; 1 the input or the run failed; 2 the command line i
 An error is one line on stderr, ``glsk: error: ...``. Results go to stdout; warnings, logs and progress to stderr.
 """
 
-from typing import Annotated
+import os
+import sys
+from typing import Annotated, Any
 
 import typer
 
 from .. import __version__
-from ..errors import MissingPackageError
+from ..errors import MissingPackageError, in_words
 from ..interop.packages import entry_points
 from .batch import batch
 from .console import echo, say
@@ -20,7 +22,7 @@ from .filters import filters
 from .grasps import grasps
 from .info import info
 from .measures import branches, tree
-from .reporting import as_command, reporting
+from .reporting import FAILURE_CODE, as_command, reporting
 from .run import run
 from .skeletonize import demo, skeletonize
 from .view import view
@@ -31,7 +33,28 @@ EPILOG = (
 )
 COMMAND_GROUP = "glsk_o3d.commands"
 
-app = typer.Typer(
+
+class Commands(typer.Typer):
+    """The commands; what Typer itself prints, such as help, ends in a line, too, where nobody takes it."""
+
+    def __call__(self, *args: Any, **options: Any) -> None:
+        try:
+            super().__call__(*args, **options)
+        except (OSError, SystemExit) as ended:  # SystemExit in the end, and where a pipe is closed
+            problem, code = (ended, 0) if isinstance(ended, OSError) else (ended.__context__, ended.code)
+        try:
+            print(end="", flush=True)
+        except OSError as error:
+            problem = problem if isinstance(problem, OSError) or code else error  # else it was said
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for what Python flushes in the end
+        if isinstance(problem, OSError):
+            refused = f"standard output: cannot be written: {problem.strerror}"
+            say("error", in_words(problem) if problem.filename else refused)
+            code = FAILURE_CODE
+        sys.exit(code)
+
+
+app = Commands(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,

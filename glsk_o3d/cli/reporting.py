@@ -2,7 +2,6 @@
 
 import inspect
 import logging
-import os
 import sys
 import traceback
 import warnings
@@ -58,9 +57,6 @@ def reporting(cloud: Path | None = None, *, quiet: bool = False, verbose: bool =
     with _log_as_lines(), _warnings_as_lines():
         try:
             yield
-        except BrokenPipeError:  # who read the output has seen enough, as in "glsk filters | head"
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for what Python flushes in the end
-            raise typer.Exit from None
         except (GlskError, OSError, MemoryError, KeyboardInterrupt) as error:
             problem = error
     if problem is None:
