@@ -6,8 +6,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from ..errors import InvalidParameterError
+from ..interop.atomic import check_ends
 from ..io.formats.text_tables import holds_points
-from ..io.paths import SCAN_ENDINGS, check_ends
+from ..io.paths import SCAN_ENDINGS
 
 LISTS = (".txt", ".csv")  # what they are, their endings do not say
 RESERVED_STEMS = ("ledger", "recipe")

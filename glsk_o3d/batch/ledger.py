@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BatchError, InvalidParameterError
-from ..interop.atomic import write_atomically, writing
+from ..interop.atomic import check_ends, write_atomically, writing
 
 try:
     import fcntl
@@ -34,6 +34,7 @@ class Ledger:
         self.path = folder / "ledger.jsonl"
         self.rows: dict[str, Row] = {}
         refuse_ways_out(folder, [self.path.name])
+        check_ends(self.path)
         lines = self.path.read_bytes().splitlines() if self.path.exists() else []
         for number, line in enumerate(lines, 1):
             try:
@@ -69,9 +70,9 @@ def _checked(row: Row, folder: Path) -> Row:
 
 def refuse_ways_out(folder: Path, paths: Iterable[str]) -> None:
     """Raise InvalidParameterError where paths in an output folder lead out of it, by ``..`` or a link."""
-    inside = folder.resolve()
+    inside = Path(os.path.realpath(folder))  # Path.resolve raises where links go in a circle
     for path in paths:
-        real = (folder / path).resolve()
+        real = Path(os.path.realpath(folder / path))
         if inside not in real.parents:
             raise InvalidParameterError(
                 f"{folder / path}: leads out of the output folder, to {real}: if it is a link, remove it, or give the "
@@ -100,6 +101,7 @@ def locked(folder: Path) -> Iterator[None]:
 
     The lock is one of the operating system: it ends with the process that holds it, however that dies.
     """
+    check_ends(folder / LOCK_FILE)
     with (folder / LOCK_FILE).open("a") as stream:
         try:
             if fcntl is not None:

@@ -192,7 +192,8 @@ class _Run:
         old = [name for name in self._rows if task.needs and name.startswith(tiles) and name not in task.needs]
         rows = [self._rows[name] for name in (task.name, *old) if name in self._rows]
         for output in {*task.outputs, *(output for row in rows for output in row["outputs"])}:
-            Path(task.out_dir, output).unlink(missing_ok=True)
+            if not os.path.isdir(path := Path(task.out_dir, output)):  # else the worker will say what is wrong
+                path.unlink(missing_ok=True)
         for row in rows:
             del self._rows[row["name"]]
         self._add(task, {"status": STARTED, "outputs": list(task.outputs)})

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InvalidCloudError, InvalidParameterError
-from ..interop.atomic import write_json
+from ..interop.atomic import check_ends, write_json
 from ..io.formats import ply
 from ..io.scan import COLOR_CHANNELS, Scan
 from ..io.scans import read_blocks
@@ -46,6 +46,7 @@ class Split:
 
 def read_split(path: Path) -> Split:
     """What is known of the parts of a scene, from its file."""
+    check_ends(path)
     kept = json.loads(path.read_text(encoding="utf-8"))
     grid: Any = {name: tuple(v) if isinstance(v, list) else v for name, v in kept["grid"].items()}
     return Split(kept["of"], tuple(kept["labels"]), kept["points"], kept["dropped"], Grid(**grid))

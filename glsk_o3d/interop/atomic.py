@@ -1,4 +1,4 @@
-"""Files that appear complete or not at all."""
+"""Files that are there to be read, and files that appear complete or not at all."""
 
 import csv
 import json
@@ -11,6 +11,25 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import FileFormatError
+
+
+def existing_file(path: str | os.PathLike[str]) -> Path:
+    """The path of a file; FileNotFoundError, or FileFormatError for a folder, a pipe or an empty file."""
+    path = Path(path)
+    if path.is_dir():
+        raise FileFormatError(f"{path}: is a folder, not a file")
+    if not path.exists():
+        raise FileNotFoundError(f"{path}: no such file")
+    check_ends(path)
+    if path.stat().st_size == 0:
+        raise FileFormatError(f"{path}: the file is empty")
+    return path
+
+
+def check_ends(path: str | os.PathLike[str]) -> None:
+    """Raise FileFormatError for a pipe or a device: what it gives may never end."""
+    if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path)):
+        raise FileFormatError(f"{path}: is a pipe or a device, not a file: write its output to a file first")
 
 
 def write_json(path: str | os.PathLike[str], data: Any) -> None:

@@ -1,13 +1,11 @@
-"""Files that are to be read: their endings, whether they are there, and whether they hold what they promise.
+"""Files that are to be read: their endings, and whether they hold what they promise.
 
 Readers compare what a header promises with the size of the file before they take memory, and with what they read before
 they return it. What unpacks or repeats itself has a budget, a multiple of the size.
 """
 
-import os
 from collections.abc import Iterable, Iterator
 from itertools import chain, islice
-from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
@@ -23,25 +21,6 @@ MESH_ENDINGS = (".obj", ".stl")
 SCAN_ENDINGS = CLOUD_ENDINGS + MESH_ENDINGS
 MOST_EXPANDED = 200  # fitted: times the size of a file that its content may take; of skeletons and scans it is 1 to 20
 ALWAYS_TAKEN = 1 << 26  # derived: bytes that any machine has
-
-
-def existing_file(path: str | os.PathLike[str]) -> Path:
-    """The path of a file; FileNotFoundError, or FileFormatError for a folder, a pipe or an empty file."""
-    path = Path(path)
-    if path.is_dir():
-        raise FileFormatError(f"{path}: is a folder, not a file")
-    if not path.exists():
-        raise FileNotFoundError(f"{path}: no such file")
-    check_ends(path)
-    if path.stat().st_size == 0:
-        raise FileFormatError(f"{path}: the file is empty")
-    return path
-
-
-def check_ends(path: str | os.PathLike[str]) -> None:
-    """Raise FileFormatError for a pipe or a device: what it gives may never end."""
-    if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path)):
-        raise FileFormatError(f"{path}: is a pipe or a device, not a file: write its output to a file first")
 
 
 def unknown_ending(what: object, known: Iterable[str]) -> FileFormatError:

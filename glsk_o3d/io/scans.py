@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileFormatError, InvalidCloudError, MissingPackageError, brief
+from ..interop.atomic import existing_file
 from ..interop.packages import import_open3d
 from .formats import pcd, ply, scanners, text_tables
-from .paths import MESH_ENDINGS, SCAN_ENDINGS, TEXT_ENDINGS, existing_file, unknown_ending
+from .paths import MESH_ENDINGS, SCAN_ENDINGS, TEXT_ENDINGS, unknown_ending
 from .scan import ALL_ROWS, NoPoints, Scan, parsed
 from .skeletons import holds_skeleton
 

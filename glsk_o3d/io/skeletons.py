@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 from ..analysis.comparison import Truth
 from ..errors import FileFormatError, brief
-from ..interop.atomic import write_atomically
+from ..interop.atomic import existing_file, write_atomically
 from ..refinement.rooted import RootPlace
 from ..skeleton import Skeleton
 from .formats import fields, gltf, lines, ply, trees
 from .formats.graphs import NoEdges, as_forest, holding_all
-from .paths import SCAN_ENDINGS, existing_file, unknown_ending
+from .paths import SCAN_ENDINGS, unknown_ending
 
 
 class Format(NamedTuple):

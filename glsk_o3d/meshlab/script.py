@@ -10,8 +10,7 @@ from xml.parsers import expat
 from xml.sax.saxutils import quoteattr
 
 from ..errors import FileFormatError, ScriptError, brief
-from ..interop.atomic import write_atomically
-from ..io.paths import existing_file
+from ..interop.atomic import existing_file, write_atomically
 
 MOST_BYTES = 1 << 20
 _ELEMENTS = ("FilterScript", "filter", "Param")  # by depth

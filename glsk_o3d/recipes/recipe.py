@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import RecipeError, did_you_mean
-from ..interop.atomic import write_json
+from ..interop.atomic import existing_file, write_json
 from ..parameters import FROM, NONE, UNWRITTEN, Parameters, problem_with, shown
 from ..pipeline import RECIPE_VERSION, Pipeline, recipe_of
 from .catalogue import catalogue, find, serves
@@ -93,8 +93,9 @@ def load_recipe(path: str | os.PathLike[str]) -> Pipeline[Any]:
 
     Raises
     ------
-    RecipeError, OSError
-        The file is no valid recipe, or cannot be read; the message names the file and the place in it.
+    RecipeError, FileFormatError, OSError
+        The file is no valid recipe; is a folder, empty or a pipe; or cannot be read. The message names the file and the
+        place in it.
 
     Examples
     --------
@@ -106,7 +107,7 @@ def load_recipe(path: str | os.PathLike[str]) -> Pipeline[Any]:
     'spread'
     """
     _check_ending(path)
-    data = Path(path).read_bytes()
+    data = existing_file(path).read_bytes()
     try:
         recipe = json.loads(data.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:

@@ -9,6 +9,7 @@ import sys
 import pytest
 
 from glsk_o3d import BatchError
+from glsk_o3d.errors import FileFormatError
 from glsk_o3d.batch.ledger import Ledger, file_hash, locked
 
 
@@ -85,3 +86,18 @@ def test_the_lock_dies_with_its_owner(tmp_path):
     owner.communicate()
     with locked(tmp_path):
         pass
+
+
+@pytest.mark.parametrize("name", ["ledger.jsonl", ".ledger.lock"])
+def test_a_pipe_in_its_place_is_refused_and_not_waited_for(tmp_path, name):
+    os.mkfifo(tmp_path / name)
+    with pytest.raises(FileFormatError, match=f"{name}: is a pipe or a device"), locked(tmp_path):
+        Ledger(tmp_path)
+
+
+def test_links_in_a_circle_lead_nowhere(tmp_path):
+    (tmp_path / "a.ply").symlink_to("b.ply")
+    (tmp_path / "b.ply").symlink_to("a.ply")
+    ledger = Ledger(tmp_path)
+    ledger.add(row("a"))
+    assert list(Ledger(tmp_path).rows) == ["a"]

@@ -1,5 +1,6 @@
 """The command as its users meet it: files, streams and exit codes; bugs, Ctrl-C, full disks."""
 
+import os
 import resource
 import signal
 import subprocess
@@ -83,11 +84,22 @@ def test_help_cuts_no_line_and_tells_the_exit_codes(invoke, monkeypatch):
     assert invoke("no-such-command").exit_code == 2
 
 
-def test_a_reader_that_has_seen_enough_ends_it_quietly(tmp_path):
-    words = [sys.executable, "-m", "glsk_o3d", "filters"]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=tmp_path) as run:
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize(
+    "words", ["--help", "--version", "info --help", "filters", "branches y.ply", "info y.ply --json"]
+)
+def test_output_that_nobody_takes_is_one_line_and_no_success(tmp_path, y, words, unbuffered):
+    command = [sys.executable, "-m", "glsk_o3d", *words.split()]
+    given = dict(stderr=subprocess.PIPE, text=True, cwd=tmp_path, env={**os.environ, "PYTHONUNBUFFERED": unbuffered})
+    with subprocess.Popen(command, stdout=subprocess.PIPE, **given) as run:
         run.stdout.close()
-        assert (run.stderr.read(), run.wait()) == (b"", 0)
+        assert run.stderr.read() == "glsk: error: standard output: cannot be written: Broken pipe\n"
+    assert run.returncode == 1
+    with open("/dev/full", "w") as full:
+        run = subprocess.run(command, stdout=full, **given)
+        assert run.stderr == "glsk: error: standard output: cannot be written: No space left on device\n"
+        assert run.returncode == 1
+        assert subprocess.run([*command, "--nonsense"], **{**given, "stderr": full}).returncode != 0
 
 
 def test_bugs_keep_their_traceback(invoke, scans, monkeypatch):
