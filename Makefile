@@ -6,6 +6,9 @@ BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip --disable-pip-version-check -qq
 # One BLAS thread per worker, because more only fight over the cores.
 PYTEST_ARGS ?= -n 2
+# What asks for the loops, ends and components that a pipeline finds, which no rounding may decide.
+GRAPH_TESTS := $(addprefix tests/,refinement samples editing test_connector.py test_lpr_reducer.py test_refiner.py \
+	test_sampler.py test_skeleton.py test_stability.py test_thinner.py)
 # See benchmarks/README.md for what else there is.
 ACCURACY_ARGS ?= truth --builtin
 PEERS_ARGS ?= run benchmarks/results
@@ -15,7 +18,7 @@ BENCH_ARGS ?= all --builtin --pictures benchmarks/results -o benchmarks/results/
 PYTHON_HINT = glsk-o3d needs Python 3.10 or newer: install it, or say 'make ... PYTHON=/path/to/python3'.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test docs figures accuracy bench fuzz peers lint format clean system-deps browser
+.PHONY: help demo test test-dispatch docs figures accuracy bench fuzz peers lint format clean system-deps browser
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -25,6 +28,10 @@ demo: $(VENV)/.installed-demo ## skeletonise the built-in sample object; writes 
 
 test: $(VENV)/.installed-test | browser ## run the whole test suite (PYTEST_ARGS="-k name" for a part)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MPLBACKEND=Agg $(BIN)/python -m pytest $(PYTEST_ARGS)
+
+test-dispatch: $(VENV)/.installed-test ## run the tests of graphs as on an older processor, which rounds otherwise
+	NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python scripts/cpu_features.py)" OPENBLAS_CORETYPE=Haswell \
+		OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MPLBACKEND=Agg $(BIN)/python -m pytest $(PYTEST_ARGS) $(GRAPH_TESTS)
 
 docs: $(VENV)/.installed-docs ## build the site into build/docs/index.html (SPHINX_ARGS for sphinx-build)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/sphinx-build -q -W --keep-going -c docs -d build/doctrees $(SPHINX_ARGS) . build/docs

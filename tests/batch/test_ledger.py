@@ -9,8 +9,8 @@ import sys
 import pytest
 
 from glsk_o3d import BatchError
-from glsk_o3d.errors import FileFormatError
 from glsk_o3d.batch.ledger import Ledger, file_hash, locked
+from glsk_o3d.errors import FileFormatError
 
 
 def row(name, **values):

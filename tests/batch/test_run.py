@@ -62,6 +62,19 @@ def test_a_second_run_does_what_has_changed(run, scans, rows, write, tmp_path):
     assert {row["status"] for row in rows().values()} == {"done"}
 
 
+def test_a_folder_in_the_place_of_a_result_costs_that_result_alone(run, scans, rows, write, tmp_path):
+    run()
+    (tmp_path / "out" / "b.ply").unlink()
+    (tmp_path / "out" / "b.ply").mkdir()
+    write(scans / "c.ply", seed=9)
+    assert run() == {"b": "outputs are gone", "c": "input changed"}
+    assert (run.result.done, run.result.failed) == (1, 1)
+    assert "b.ply: is a folder or a device, not a file to write to" in rows()["b"]["error"]
+    (tmp_path / "out" / "b.ply").rmdir()
+    assert run() == {"b": "failed before"}
+    assert (run.result.done, run.result.failed) == (1, 0)
+
+
 def test_other_parameters_are_another_result(run, scans, rows):
     scan = [scans / "a.ply"]
     run()
