@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from functools import cache
 from html import escape
 from importlib.metadata import PackageNotFoundError, version
-from string import Formatter
 from typing import Any, get_args, get_origin, get_type_hints
 
 from .decisions import QUESTIONS, Decision, Place, Supported
@@ -88,16 +87,15 @@ class Markup(str):
     """HTML."""
 
 
-class _Escaping(Formatter):
-    def format_field(self, value: Any, spec: str) -> str:
-        if isinstance(value, list):
-            return "".join(self.format_field(each, spec) for each in value)
-        return value if isinstance(value, Markup) else escape(format(value, spec))
-
-
 def markup(template: str, *values: Any, **named: Any) -> Markup:
     """HTML of a template, as `str.format` fills it: every value is escaped, but HTML, and each of those in a list."""
-    return Markup(_Escaping().vformat(template, values, named))
+
+    def safe(value: Any) -> str:
+        if isinstance(value, list):
+            return "".join(map(safe, value))
+        return value if isinstance(value, Markup) else escape(str(value))
+
+    return Markup(template.format(*map(safe, values), **{name: safe(value) for name, value in named.items()}))
 
 
 def warn(messages: Iterable[str]) -> None:
@@ -201,8 +199,7 @@ class Report:
     def _repr_html_(self) -> Markup:
         cell = '<td style="text-align:left;padding:2px 10px">{}</td>'  # not every notebook has Jupyter's sheet
         rows = [markup("<tr>{}</tr>", [markup(cell, text) for text in row]) for row in self._told()]
-        style = "font:13px/1.5 system-ui,sans-serif;border-collapse:collapse"
-        return markup('<table style="{}">{}</table>', style, rows)
+        return markup('<table style="font:13px/1.5 system-ui,sans-serif;border-collapse:collapse">{}</table>', rows)
 
     def _told(self) -> list[tuple[str, str]]:
         """The lines, each as a name and what there is to say of it; the warnings come last."""

@@ -23,8 +23,7 @@ def figures(skeleton: Skeleton) -> Markup:
 def warnings(messages: Iterable[str]) -> Markup:
     """The warnings, each once."""
     rows = [markup("<li>{}</li>", text) for text in dict.fromkeys(messages)]
-    box = '<div class="warnings" role="note"><strong>Warnings</strong><ul>{}</ul></div>'
-    return markup(box if rows else "", rows)
+    return markup('<div class="warnings" role="note"><strong>Warnings</strong><ul>{}</ul></div>' if rows else "", rows)
 
 
 def contraction(report: Report) -> Markup:
@@ -48,7 +47,7 @@ def topology(report: Report) -> Markup:
     rows = [(it.outcome, it.question, f"{it.probability:.2f}") for it in listed[:MOST_LISTED_ROWS]]
     marks = [Markup(' class="uncertain"' if it.is_uncertain else "") for it in listed[:MOST_LISTED_ROWS]]
     rest = len(listed) - MOST_LISTED_ROWS
-    more = markup('<p class="muted small">and {:,} clearer ones</p>' if rest > 0 else "", rest)
+    more = markup('<p class="muted small">and {} clearer ones</p>' if rest > 0 else "", f"{rest:,}")
     table = _table(("done", "question", "probability"), rows, "topology", marks)
     return markup("<h2>Topology</h2><p>{}</p>{}{}", calls, table, more)
 
