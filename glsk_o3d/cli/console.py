@@ -29,9 +29,7 @@ flags = Flags()
 
 
 def visible(text: str) -> str:
-    """Text with its control characters, but line ends and tabs, written as Python writes them: terminals obey them,
-    and change the order of words at some.
-    """
+    """Text in which what terminals obey, but line ends and tabs, stands as Python writes it."""
     return re.sub(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]", lambda found: repr(found[0])[1:-1], text)
 
 

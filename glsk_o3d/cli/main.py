@@ -48,10 +48,9 @@ class Commands(typer.Typer):
             problem = problem if isinstance(problem, OSError) or code else error  # else it was said
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for what Python flushes in the end
         if isinstance(problem, OSError):
-            refused = f"standard output: cannot be written: {problem.strerror}"
-            say("error", in_words(problem) if problem.filename else refused)
-            code = FAILURE_CODE
-        sys.exit(code)
+            problem.filename = problem.filename or "standard output: cannot be written"
+            say("error", in_words(problem))
+        sys.exit(FAILURE_CODE if isinstance(problem, OSError) else code)
 
 
 app = Commands(

@@ -62,7 +62,7 @@ def _page(skeleton: Skeleton, title: str) -> str:
     report, kind = skeleton.report, "Curve skeleton" if len(skeleton.vertices) else "Point cloud"
     now = datetime.now(timezone.utc).strftime("%d %B %Y, %H:%M UTC")
     thinning = f"The view shows {len(shown):,} of {finite:,} points, drawn at random."
-    below = (sections.contraction(report), sections.topology(report), sections.support(report), sections.origin(report))
+    below = [sections.contraction(report), sections.topology(report), sections.support(report), sections.origin(report)]
     return markup(
         html,
         title=title,
@@ -72,7 +72,7 @@ def _page(skeleton: Skeleton, title: str) -> str:
         figures=sections.figures(skeleton),
         warnings=sections.warnings(report.warnings),
         thinning=thinning if len(shown) < finite else "",
-        sections=list(below),
+        sections=below,
         # no "<" in it, so that nothing in it can end the script element
         data=Markup(json.dumps(_data(skeleton, shown), allow_nan=False).replace("<", "\\u003c")),
         script=Markup(script),
