@@ -47,7 +47,7 @@ class Commands(typer.Typer):
         except OSError as error:
             problem = problem if isinstance(problem, OSError) or code else error  # else it was said
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for what Python flushes in the end
-        if isinstance(problem, OSError):
+        if isinstance(problem, OSError) and not isinstance(problem, BrokenPipeError):
             problem.filename = problem.filename or "standard output: cannot be written"
             say("error", in_words(problem))
         sys.exit(FAILURE_CODE if isinstance(problem, OSError) else code)

@@ -72,7 +72,8 @@ def reporting(cloud: Path | None = None, *, quiet: bool = False, verbose: bool =
         code = USAGE_CODE
     elif isinstance(problem, InvalidCloudError) and cloud is not None:
         message = f"{cloud}: {message}"
-    say("error", message)
+    if not isinstance(problem, BrokenPipeError):  # who closed the pipe knows
+        say("error", message)
     raise typer.Exit(code)
 
 

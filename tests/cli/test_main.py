@@ -93,7 +93,7 @@ def test_output_that_nobody_takes_is_one_line_and_no_success(tmp_path, y, words,
     given = dict(stderr=subprocess.PIPE, text=True, cwd=tmp_path, env={**os.environ, "PYTHONUNBUFFERED": unbuffered})
     with subprocess.Popen(command, stdout=subprocess.PIPE, **given) as run:
         run.stdout.close()
-        assert run.stderr.read() == "glsk: error: standard output: cannot be written: Broken pipe\n"
+        assert run.stderr.read() == ""  # who closed it knows
     assert run.returncode == 1
     with open("/dev/full", "w") as full:
         run = subprocess.run(command, stdout=full, **given)
