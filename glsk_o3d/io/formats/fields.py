@@ -52,8 +52,9 @@ def npz_arrays(data: bytes, names: Iterable[str]) -> dict[str, Any]:
         check_budget(sum(info.file_size for info in archive.zip.infolist()), len(data))
         for name in {*names} & {*archive}:
             with archive.zip.open(f"{name}.npy") as held:
-                np.lib.format.read_magic(held)
-                shape, _, kind = np.lib.format.read_array_header_1_0(held)
+                first = np.lib.format.read_magic(held) == (1, 0)  # later ones may have longer headers
+                read = np.lib.format.read_array_header_1_0 if first else np.lib.format.read_array_header_2_0
+                shape, _, kind = read(held)
                 check_promised(math.prod(shape) * kind.itemsize, archive.zip.getinfo(f"{name}.npy").file_size, name)
             arrays[name] = archive[name]
     return arrays

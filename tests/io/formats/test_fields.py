@@ -89,14 +89,26 @@ def test_npz_never_unpickles_nor_fills_the_memory(tree, tmp_path):
         read_skeleton(tmp_path / "s.npz")
 
 
+@pytest.mark.parametrize("version", [(1, 0), (2, 0), (3, 0)])
+def test_arrays_of_all_versions_are_read(tree, tmp_path, version, assert_identical):
+    with np.load(io.BytesIO(write_npz(tree))) as archive, zipfile.ZipFile(tmp_path / "s.npz", "w") as written:
+        for name in archive:
+            with written.open(f"{name}.npy", "w") as stream:
+                np.lib.format.write_array(stream, archive[name], version)
+    assert_identical(read_skeleton(tmp_path / "s.npz"), tree)
+
+
+@pytest.mark.parametrize("version", [1, 2, 3])
 @pytest.mark.parametrize("shape", ["(9999999999999, 3)", "(3, 9999999)", "(1, 1, 6)", "(7, 3)"])
-def test_arrays_that_are_larger_than_their_bytes_are_refused(tree, tmp_path, shape):
+def test_arrays_that_are_larger_than_their_bytes_are_refused(tree, tmp_path, shape, version):
     with zipfile.ZipFile(io.BytesIO(write_npz(tree))) as packed, zipfile.ZipFile(tmp_path / "s.npz", "w") as lying:
         for name in packed.namelist():
             content = packed.read(name)
             if name == "vertices.npy":
                 header = content[:128].replace(b"(6, 3)", shape.encode())
                 content = header[:127].rstrip()[:127].ljust(127) + b"\n" + content[128:]
+                if version > 1:  # four bytes for the length of the header, not two
+                    content = content[:6] + bytes([version]) + content[7:10] + b"\0\0" + content[10:]
             lying.writestr(name, content)
     with pytest.raises(FileFormatError, match=r"not a valid \.npz skeleton"):
         read_skeleton(tmp_path / "s.npz")
