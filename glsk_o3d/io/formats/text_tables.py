@@ -1,6 +1,7 @@
 """Clouds as text: CSV, TXT, ASC and XYZ, with or without a line of names; all numbers are kept.
 
 The columns are parted by spaces, tabs, commas or semicolons, and lines ahead of the first three numbers are a header.
+Where commas do not part columns, they are decimal points.
 """
 
 import logging
@@ -10,7 +11,7 @@ from array import array
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
-from typing import NamedTuple, TextIO
+from typing import Any, NamedTuple, TextIO
 
 import numpy as np
 
@@ -21,6 +22,7 @@ _log = logging.getLogger(__name__)
 _COMMENTS = ("#", "//", "%")
 HEADER_LINES = 100  # fitted to nothing: longer headers are those of other files
 MOST_COLUMNS = 1000  # fitted: a point has a few
+AMBIGUOUS = "between columns and in numbers are not understood: part columns by semicolons"
 _ROLES = {
     **dict.fromkeys(("x", "easting"), "x"),
     **dict.fromkeys(("y", "northing"), "y"),
@@ -73,14 +75,18 @@ def _layout(stream: TextIO) -> Layout:
     for skip, line in enumerate(islice(stream, HEADER_LINES)):
         comment = next((mark for mark in _COMMENTS if line.lstrip().startswith(mark)), "")
         line = line.strip().removeprefix(comment)
-        delimiter = ";" if ";" in line else "," if "," in line else None
-        words = [word.strip().strip("\"'") for word in line.split(delimiter)]
-        columns = [i for i, word in enumerate(words) if not comment and _number(word) is not None]
+        for delimiter in [";"] if ";" in line else [",", None, ","] if "," in line else [None]:
+            words = [word.strip().strip("\"'") for word in line.split(delimiter)]
+            columns = [i for i, word in enumerate(words) if not comment and _number(word, delimiter) is not None]
+            if len(columns) >= 3:
+                break
         if len(columns) > MOST_COLUMNS:
             raise ValueError(f"a line has {len(columns)} numbers, and at most {MOST_COLUMNS} are read")
         if len(columns) >= 3:
             if not names and len(above) == len(words):
                 raise NoPoints(f"its columns are called {', '.join(above)}: call three of them x, y and z")
+            if names and delimiter == "," and len(words) == 2 * len(names):
+                raise NoPoints(f"commas {AMBIGUOUS}")
             named = len(names) == len(words)
             return Layout(skip, delimiter, [names[i] for i in columns] if named else [], columns)
         if words[:1] == ["ncols"]:
@@ -94,22 +100,16 @@ def _layout(stream: TextIO) -> Layout:
 
 def _rows(stream: TextIO, layout: Layout, path: Path) -> np.ndarray:
     """The numbers, (N, C) float array; cells without a number are NaN, but rows without a place are left out."""
+    form: Any = dict(delimiter=layout.delimiter, comments=_COMMENTS, usecols=layout.columns, ndmin=2)
     with suppress(ValueError):  # some line is not like the others
-        return np.loadtxt(
-            stream,
-            delimiter=layout.delimiter,
-            comments=_COMMENTS,
-            skiprows=layout.skip,
-            usecols=layout.columns,
-            ndmin=2,
-        )
+        return np.loadtxt(stream, skiprows=layout.skip, **form)
     stream.seek(0)
     found, lost, last = array("d"), 0, layout.columns[-1]
     for line in islice(stream, layout.skip, None):
         words = line.partition("#")[0].split(layout.delimiter)
         if not any(map(str.strip, words)):
             continue
-        row = [_number(words[i]) if i < len(words) else None for i in layout.columns]
+        row = [_number(words[i], layout.delimiter) if i < len(words) else None for i in layout.columns]
         cut = not line.endswith("\n") and len(words) <= last  # its last number may have been longer
         if cut or None in row[:3]:
             lost += 1
@@ -117,7 +117,7 @@ def _rows(stream: TextIO, layout: Layout, path: Path) -> np.ndarray:
             found.extend(math.nan if number is None else number for number in row)
     rows = np.array(found).reshape(-1, len(layout.columns))
     if lost > len(rows):
-        raise NoPoints(f"{lost} of {lost + len(rows)} lines hold no point; decimal commas are not understood")
+        raise NoPoints(f"{lost} of {lost + len(rows)} lines hold no point; commas {AMBIGUOUS}")
     if lost:
         _log.warning("%s: %d of %d lines hold no point and were skipped", path, lost, lost + len(rows))
     return rows
@@ -136,8 +136,8 @@ def _whole(values: np.ndarray) -> np.ndarray:
     return values.astype(np.int32) if whole else values
 
 
-def _number(word: str) -> float | None:
+def _number(word: str, delimiter: str | None) -> float | None:
     try:
-        return None if "_" in word else float(word)
+        return None if "_" in word else float(word if delimiter == "," else word.replace(",", "."))
     except ValueError:
         return None

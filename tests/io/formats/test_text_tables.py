@@ -20,6 +20,9 @@ LAYOUTS = {  # the ending, the line of names, and what parts the numbers
 }
 
 
+RANDOM = np.random.default_rng(4)
+
+
 @pytest.mark.parametrize("program", LAYOUTS)
 def test_named_columns(tmp_path, program):
     ending, names, apart = LAYOUTS[program]
@@ -81,8 +84,13 @@ def test_attributes_become_those_of_a_tensor_cloud(tmp_path):
     ("text", "why"),
     [
         ("these are\nwords alone, and no more\n", "no line of its beginning has three numbers"),
-        ("1,5;2,5;3,5\n4,5;5,5;6,5\n", "no line of its beginning has three numbers"),
-        ("0 0 0\n" + 2 * "1,5 2,5 3,5\n", "2 of 3 lines hold no point; decimal commas are not understood"),
+        ("x;y;z\n" + 2 * "1.234,5;2.345,6;3.456,7\n", "no line of its beginning has three numbers"),
+        ("0 0 0\n" + 2 * "a b c\n", "2 of 3 lines hold no point; commas between columns and in numbers"),
+        (
+            "x,y,z\n1,5,2,5,3,5\n",
+            "commas between columns and in numbers are not understood: part columns by semicolons",
+        ),
+        (2 * '"1,5","2,5","3,5"\n', "2 of 2 lines hold no point; commas between columns and in numbers"),
         ("ncols 4\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3 4\n", "it is a grid of heights"),
         ("length,radius,angle\n1,2,3\n", "its columns are called length, radius, angle: call three of them x, y and z"),
     ],
@@ -92,6 +100,19 @@ def test_text_that_is_no_cloud(tmp_path, text, why):
     assert holds_points(tmp_path / "c.csv") == ("hold no point" in why)
     with pytest.raises(FileFormatError, match=rf"c\.csv: no points could be read: {why}"):
         read_cloud(tmp_path / "c.csv")
+
+
+@pytest.mark.parametrize("apart", [";", " ; ", "\t", "  "])
+@pytest.mark.parametrize("head", ["", "x y z label\n", "0 0 0 0\n"], ids=["bare", "names", "whole"])
+@pytest.mark.parametrize("form", ["{:.17f}", "{:+.16e}"])
+def test_decimal_commas(tmp_path, apart, head, form):
+    rows = [*RANDOM.normal(size=(5, 3)) * 1000]
+    lines = [apart.join([*(form.format(value).replace(".", ",") for value in row), "7"]) for row in rows]
+    (tmp_path / "c.csv").write_text(head.replace(" ", apart) + "\n".join(lines) + "\n")
+    assert holds_points(tmp_path / "c.csv")
+    scan = read_scan(tmp_path / "c.csv")
+    np.testing.assert_allclose(scan.positions[-5:], rows, rtol=1e-15)
+    np.testing.assert_array_equal(scan.attributes["label" if "x" in head else "column_4"][-5:], 7)
 
 
 @pytest.mark.parametrize(
