@@ -69,6 +69,8 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
     held = geometry.vertex if name == "TriangleMesh" else geometry.point
     positions = held.positions
     own = positions.dtype if positions.dtype in (o3d.core.float32, o3d.core.float64) else o3d.core.float64
+    if "colors" in found and name == "TriangleMesh":
+        found["colors"] = found["colors"] / 255  # Open3D writes meshes in other colours than floats white
     for key, values in found.items():
         values = np.ascontiguousarray(values).reshape(len(values), -1)
         held[key] = o3d.core.Tensor(values, own if values.dtype.kind == "f" else None, positions.device)

@@ -93,3 +93,19 @@ def test_colours(cloud, skeleton):
     shown = annotate(skeleton, cloud, color="branch").point.colors.numpy()
     assert shown.dtype == np.uint8
     assert len(np.unique(np.column_stack([shown, segment(skeleton)]), axis=0)) == len(np.unique(shown, axis=0)) == 3
+
+
+@pytest.mark.parametrize("color", ["branch", "radius", (0.2, 0.4, 1.0)])
+@pytest.mark.parametrize("kind", [o3d.core.float32, o3d.core.float64])
+def test_colours_of_meshes_are_those_of_clouds_in_files_too(skeleton, tmp_path, kind, color):
+    vectors = o3d.utility.Vector3dVector
+    mesh = o3d.geometry.TriangleMesh(vectors(POINTS), o3d.utility.Vector3iVector([[0, 1, 2]]))
+    mesh.vertex_colors = vectors(COLORS / 255)  # which are replaced
+    shown = annotate(skeleton, POINTS, color=color).point.colors.numpy()
+    for given in (mesh, o3d.t.geometry.TriangleMesh.from_legacy(mesh, kind)):
+        marked = annotate(skeleton, given, color=color)
+        np.testing.assert_allclose(marked.vertex.colors.numpy(), shown / 255, atol=1e-7)
+        np.testing.assert_allclose(np.asarray(marked.to_legacy().vertex_colors), shown / 255, atol=1e-7)
+        o3d.t.io.write_triangle_mesh(str(tmp_path / "m.ply"), marked)
+        back = o3d.t.io.read_triangle_mesh(str(tmp_path / "m.ply")).vertex.colors.numpy()
+        np.testing.assert_allclose(np.round(255.0 * back if back.dtype.kind == "f" else back), shown, atol=1)
