@@ -41,9 +41,9 @@ def skeletonize(
     pipeline : Pipeline, {"default", "wen2024", "cao2010"}, name of a plugin's pipeline, or path of a recipe
         A name that ends in ``.json`` is a path. A mapping is options for ``"default"``.
     on_iteration : callable, optional
-        Called with the IterationRecord of each solve; return False to stop the contraction there.
+        Called with the IterationRecord of each solve; return False, or 0, to stop the contraction there.
     on_state : callable, optional
-        Called before `on_iteration` with the Contraction after each solve.
+        Called before `on_iteration` with a copy of the Contraction after each solve.
     **options
         Parameters of the filters, by name. If more than one filter has the name, give a mapping,
         ``{"Connector.radius": "2%"}``: as `pipeline` for ``"default"``, else to `Pipeline.with_options`.

@@ -6,7 +6,7 @@ import dataclasses
 import logging
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from copy import copy
+from copy import copy, deepcopy
 from itertools import pairwise
 from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
 
@@ -166,9 +166,9 @@ class Pipeline(Generic[Produced]):
         ----------
         cloud : cloud, or whatever the first filter consumes
         on_iteration : callable, optional
-            Called with the IterationRecord of each solve; return False to stop the contraction there.
+            Called with the IterationRecord of each solve; return False, or 0, to stop the contraction there.
         on_state : callable, optional
-            Called before it with the Contraction after each solve.
+            Called before it with a copy of the Contraction after each solve.
         on_stage : callable, optional
             Called with each filter before it runs.
 
@@ -340,7 +340,8 @@ def _watch(on_iteration: OnIteration | None, on_state: OnState | None) -> Watch 
         record = state.report.iterations[-1]
         _log.debug(SOLVED, vars(record))
         if on_state is not None:
-            on_state(state)
-        return None if on_iteration is None else on_iteration(record)
+            on_state(deepcopy(state))  # what is done to it does not change the run
+        answer = None if on_iteration is None else on_iteration(record)
+        return None if answer is None else answer not in (False,)  # NumPy's False and 0 are equal to it
 
     return watch

@@ -286,3 +286,27 @@ def test_any_rotation_of_the_points_in_any_order(name):
     np.testing.assert_array_equal(place[turned.vertex_of_point], still.vertex_of_point[order])
     np.testing.assert_allclose(turned.radii, still.radii[place], atol=size)
     np.testing.assert_allclose(turned.confidence, still.confidence[place], atol=1e-6)
+
+
+# ----------------------------------------------------------------------------------------------------------- callbacks
+
+
+@pytest.mark.parametrize("answer", [False, np.False_, 0, 0.0, np.int64(0)])
+def test_what_stops_a_contraction(answer):
+    stopped = skeletonize(POINTS, on_iteration=lambda record: answer if record.iteration == 2 else None)
+    assert len(stopped.report.iterations) == 2
+    assert stopped.report.stop_reason == "stopped by the caller"
+
+
+@pytest.mark.parametrize("answer", [None, True, np.True_, 1, "", [], object()])
+def test_what_does_not(answer):
+    assert_same(skeletonize(POINTS, on_iteration=lambda record: answer), skeletonize(POINTS))
+
+
+def test_what_a_caller_does_to_a_state_does_not_change_the_run():
+    def spoil(state):
+        for array in (state.positions, state.previous, state.cloud, state.points, state.mass, state.rings.indices):
+            array[:] = 0
+        state.report.versions.clear()
+
+    assert_same(skeletonize(POINTS, on_state=spoil), skeletonize(POINTS))
