@@ -16,8 +16,8 @@ TEXT_ENDINGS = (".xyz", ".csv", ".txt", ".asc")
 """Clouds as text."""
 CLOUD_ENDINGS = (".ply", ".pcd", *TEXT_ENDINGS, ".las", ".laz", ".e57")
 """Files that `read_cloud` reads as clouds."""
-MESH_ENDINGS = (".obj", ".stl")
-"""Files that `read_cloud` reads as meshes, to take their vertices."""
+MESH_ENDINGS = (".obj", ".stl", ".off", ".glb")
+"""Files that `read_cloud` reads as meshes."""
 SCAN_ENDINGS = CLOUD_ENDINGS + MESH_ENDINGS
 MOST_EXPANDED = 200  # fitted: times the size of a file that its content may take; of skeletons and scans it is 1 to 20
 ALWAYS_TAKEN = 1 << 26  # derived: bytes that any machine has

@@ -1,13 +1,10 @@
-"""Scans from files, clouds and meshes of which the vertices are taken, whole or in blocks."""
+"""Scans from files, clouds and meshes, whole or in blocks."""
 
 import errno
-import logging
 import os
-import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -15,15 +12,12 @@ import numpy as np
 from ..errors import FileFormatError, InvalidCloudError, MissingPackageError, brief
 from ..interop.atomic import existing_file
 from ..interop.packages import import_open3d
-from .formats import pcd, ply, scanners, text_tables
+from .formats import lines, pcd, ply, scanners, text_tables
 from .paths import MESH_ENDINGS, SCAN_ENDINGS, TEXT_ENDINGS, unknown_ending
 from .scan import ALL_ROWS, NoPoints, Scan, parsed
 from .skeletons import holds_skeleton
 
-FEW_VERTICES = 1000  # fitted: of a mesh; clouds of so few points have hardly a surface
 BLOCK_ROWS = 1_000_000  # measured: larger blocks are not read faster, and take more memory
-_NAMES_MATERIALS = re.compile(rb"((?:^|[\r\n\f\0\\])[ \t]*)m")  # ``mtllib``, also where a line goes on
-_log = logging.getLogger(__name__)
 
 Reader = Callable[[Path, int, bool], tuple[int | None, Iterator[Scan]]]
 """Gives the number of points by the header, None if the file is read whole, and blocks of so many, of positions alone
@@ -35,13 +29,10 @@ def _whole(read: Callable[[Path], Scan]) -> Reader:
     return lambda path, rows, bare: (None, map(read, [path]))  # not read before it is asked for
 
 
-def _vertices(path: Path) -> Scan:
-    """The vertices of an OBJ or STL file, and the triangles between them."""
+def _opened_by_open3d(path: Path) -> Scan:
+    """The vertices of a file that Open3D reads, and the triangles between them."""
     o3d = import_open3d()
-    with TemporaryDirectory() as folder, o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-        if path.suffix.lower() == ".obj":  # Open3D would read all textures that it names
-            path, whole = Path(folder, "mesh.obj"), path
-            path.write_bytes(_NAMES_MATERIALS.sub(rb"\1#", whole.read_bytes()))
+    with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
         mesh = o3d.io.read_triangle_mesh(str(path))
     colors = np.asarray(mesh.vertex_colors) if mesh.has_vertex_colors() else None
     normals = np.asarray(mesh.vertex_normals) if mesh.has_vertex_normals() else None
@@ -49,7 +40,8 @@ def _vertices(path: Path) -> Scan:
 
 
 _SCAN_READERS: dict[str, Reader] = {
-    **dict.fromkeys(MESH_ENDINGS, _whole(_vertices)),
+    **dict.fromkeys(MESH_ENDINGS, _whole(_opened_by_open3d)),
+    ".obj": _whole(lines.read_mesh),
     **dict.fromkeys(TEXT_ENDINGS, _whole(text_tables.read)),
     **dict.fromkeys((".las", ".laz"), scanners.blocks),
     ".e57": _whole(scanners.read_e57),
@@ -61,13 +53,13 @@ _SCAN_READERS: dict[str, Reader] = {
 def read_cloud(path: str | os.PathLike[str], *, where: str | None = None) -> Any:
     """Read a point cloud, or the vertices of a mesh.
 
-    All coordinates keep their digits. A warning is logged for a mesh of few vertices, which describe the surface badly.
+    All coordinates keep their digits.
 
     Parameters
     ----------
     path : path-like
-        PLY, PCD, CSV, TXT, ASC, XYZ; LAS and LAZ (extra ``las``), E57 (extra ``e57``); or a mesh with triangles as
-        OBJ or STL. In text, lines that hold no point are skipped and logged.
+        PLY, PCD, CSV, TXT, ASC, XYZ; LAS and LAZ (extra ``las``), E57 (extra ``e57``); or a mesh as PLY, OBJ, STL, OFF
+        or GLB. In text, lines that hold no point are skipped and logged.
     where : str, optional
         Only points for which this holds, such as ``"classification in (2, 5) and z > 1.5"``: attributes and places,
         compared with numbers.
@@ -127,19 +119,12 @@ def read_tensor_cloud(path: str | os.PathLike[str], *, where: str | None = None)
 
 
 def read_scan(path: str | os.PathLike[str], where: str | None = None) -> Scan:
-    """Read all that `read_tensor_cloud` does, and the triangles between the points of a mesh if all are taken."""
-    scan = next(read_blocks(path, rows=ALL_ROWS, where=where))
-    if len(scan.triangles) and len(scan) < FEW_VERTICES:
-        _log.warning(
-            "%s: this mesh has %d vertices, and only vertices count as points: sample its surface "
-            "first, for example with Open3D's sample_points_uniformly",
-            *(os.fspath(path), len(scan)),
-        )
-    return scan
+    """Read a cloud, or the vertices of a mesh and the triangles between them."""
+    return next(read_blocks(path, rows=ALL_ROWS, where=where))
 
 
 def read_mesh(path: str | os.PathLike[str]) -> Any:
-    """Read an Open3D triangle mesh from PLY, OBJ or STL; errors as from `read_cloud`, and
+    """Read an Open3D triangle mesh from PLY, OBJ, STL, OFF or GLB; errors as from `read_cloud`, and
     FileFormatError for a file without triangles.
     """
     endings = (".ply", *MESH_ENDINGS)
@@ -148,10 +133,8 @@ def read_mesh(path: str | os.PathLike[str]) -> Any:
     scan, o3d = next(read_blocks(path, rows=ALL_ROWS)), import_open3d()
     if not len(scan.triangles):
         raise FileFormatError(f"{path}: no triangles could be read: it is a cloud, or damaged")
-    vectors = o3d.utility.Vector3dVector
-    mesh = o3d.geometry.TriangleMesh(
-        vectors(scan.positions), o3d.utility.Vector3iVector(scan.triangles.astype(np.int32))
-    )
+    vectors, corners = o3d.utility.Vector3dVector, o3d.utility.Vector3iVector
+    mesh = o3d.geometry.TriangleMesh(vectors(scan.positions), corners(scan.triangles.astype(np.int32)))
     for name, values in (("vertex_normals", scan.normals), ("vertex_colors", scan.colors)):
         if values is not None:
             setattr(mesh, name, vectors(values))

@@ -7,14 +7,17 @@ is a point.
 
 import base64
 from collections.abc import Iterable
-from itertools import pairwise
+from itertools import chain, pairwise
+from pathlib import Path
 from typing import BinaryIO
 from xml.etree import ElementTree as xml
 
 import numpy as np
 
 from ...skeleton import Skeleton
+from ..scan import Scan
 from .graphs import NoEdges, graph_skeleton, line, text, words_by_line
+from .ply import Lists, triangles
 
 _OBJ_MARK = b"# curve skeleton written by glsk-o3d"
 _VTK_TYPES = {"f": "Float64", "i": "Int64"}
@@ -37,21 +40,37 @@ def write_obj(skeleton: Skeleton) -> bytes:
 
 def read_obj(data: bytes) -> Skeleton:
     """The skeleton in the content of an OBJ file."""
+    vertices, paths = joined_vertices(data, "l")
+    if not (paths or data.startswith(_OBJ_MARK)):
+        raise NoEdges
+    return graph_skeleton([vertex[:3] for vertex in vertices], list(chain.from_iterable(map(pairwise, paths))))
+
+
+def read_mesh(path: Path) -> Scan:
+    """The vertices of an OBJ file with their colours, and its faces as triangles."""
+    vertices, faces = joined_vertices(path.read_bytes(), "f")
+    corners = Lists(np.array(list(map(len, faces))), np.array(list(chain.from_iterable(faces))))
+    colored = min(map(len, vertices)) == 6
+    table = np.array([vertex if colored else vertex[:3] for vertex in vertices])
+    found = triangles({"vertex_indices": corners}, len(table))
+    return Scan(table[:, :3], table[:, 3:] if colored else None, triangles=found)
+
+
+def joined_vertices(data: bytes, joined: str) -> tuple[list[list[float]], list[list[int]]]:
+    """The vertices of an OBJ file, with colours if they have some, and those that each ``l`` or ``f`` line joins."""
     vertices: list[list[float]] = []
-    edges: list[tuple[int, int]] = []
-    for keyword, *words in words_by_line(data):
+    paths: list[list[int]] = []
+    for keyword, *words in words_by_line(data.replace(b"\r\n", b"\n").replace(b"\\\n", b" ")):
         if keyword == "v":
-            vertices.append([float(word) for word in words[:3]])
-        elif keyword == "l":
+            vertices.append([float(word) for word in words[:6]])
+        elif keyword == joined:
             ends = [int(word.partition("/")[0]) for word in words]
             if 0 in ends:
-                raise ValueError("OBJ counts vertices from 1 and a line names vertex 0")
-            edges += pairwise(end - 1 if end > 0 else end + len(vertices) for end in ends)
+                raise ValueError("OBJ counts vertices from 1 and a line or face names vertex 0")
+            paths.append([end - 1 if end > 0 else end + len(vertices) for end in ends])
     if not vertices:
         raise ValueError("it has no 'v' line")
-    if not (edges or data.startswith(_OBJ_MARK)):
-        raise NoEdges
-    return graph_skeleton(vertices, edges)
+    return vertices, paths
 
 
 def write_vtp(skeleton: Skeleton) -> bytes:

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from glsk_o3d import save_skeleton
+from glsk_o3d import FileFormatError, save_skeleton
+from glsk_o3d.io.scans import read_scan
 from glsk_o3d.io.skeletons import read_skeleton
 
 
@@ -48,3 +49,71 @@ def test_vtk_reads_vertices_branches_and_radii(skeleton, tmp_path):
     for i, path in enumerate(skeleton.branches):
         cell = back.GetCell(alone + i)
         assert [cell.GetPointId(j) for j in range(cell.GetNumberOfPoints())] == path.tolist()
+
+
+# -------------------------------------------------------------------------------------------------------------- meshes
+
+CUBE = [(x, y, z) for x in (0, 1 / 3) for y in (0, 1) for z in (0, 1)]
+QUADS = [(1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 6, 8, 4)]
+POINTS = "".join(f"v {500000 + x!r} {y} {z}\n" for x, y, z in CUBE)
+FIRST = "mtllib no.mtl\nusemtl grey\nvt 0 0\nvt 1 0\nvn 0 0 1\no a\n"
+FORMS = {
+    "plain": "".join(f"f {a} {b} {c} {d}\n" for a, b, c, d in QUADS),
+    "negative": "".join("f " + " ".join(str(i - 9) for i in quad) + "\n" for quad in QUADS),
+    "v/vt/vn": "".join("f " + " ".join(f"{i}/{1 + n % 2}/1" for n, i in enumerate(quad)) + "\n" for quad in QUADS),
+    "v//vn": "".join("f " + " ".join(f"{i}//1" for i in quad) + "\n" for quad in QUADS),
+    "v/vt": "".join("f " + " ".join(f"{i}/2" for i in quad) + "\n" for quad in QUADS),
+    "materials": "".join(f"usemtl m{a}\ng g{a}\nf {a} {b} {c} {d}\n" for a, b, c, d in QUADS),
+    "mixed": "".join(f"f {a} {b} {c}\nf {a} {c} {d}\n" for a, b, c, d in QUADS[:3])
+    + "".join(f"f {a} {b} {c} {d}\n" for a, b, c, d in QUADS[3:]),
+    "continued": "".join(f"f {a} {b} \\\n{c} {d} # {a}\n" for a, b, c, d in QUADS),
+    "with lines": "l 1 2\n" + "".join(f"f {a} {b} {c} {d}\n" for a, b, c, d in QUADS),
+}
+
+
+def area(scan):
+    a, b, c = (scan.positions[corner] for corner in scan.triangles.T)
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+
+
+@pytest.mark.parametrize("ends", ["\n", "\r\n"])
+@pytest.mark.parametrize("form", FORMS)
+def test_polygons_of_obj(tmp_path, form, ends):
+    (tmp_path / "m.obj").write_bytes((FIRST + POINTS + FORMS[form]).replace("\n", ends).encode())
+    scan = read_scan(tmp_path / "m.obj")
+    np.testing.assert_array_equal(scan.positions, np.array(CUBE) + [500000, 0, 0])  # with all digits
+    assert scan.triangles.shape == (12, 3)
+    np.testing.assert_allclose(area(scan), 2 + 4 / 3, rtol=1e-9)
+
+
+def test_corners_that_are_counted_back_from_where_they_stand(tmp_path):
+    layers = [f"v 0 0 {z}\nv 1 0 {z}\nv 1 1 {z}\nv 0 1 {z}\nf -4 -3 -2 -1\n" for z in range(3)]
+    (tmp_path / "m.obj").write_text("".join(layers))
+    scan = read_scan(tmp_path / "m.obj")
+    np.testing.assert_array_equal(
+        scan.triangles, [each + 4 * z for z in range(3) for each in np.array([[0, 1, 2], [0, 2, 3]])]
+    )
+    assert area(scan) == 3
+
+
+@pytest.mark.parametrize("n", [3, 4, 5, 64])
+def test_polygons_of_many_corners(tmp_path, n):
+    angle = 2 * np.pi * np.arange(n) / n
+    text = "".join(f"v {np.cos(a)} {np.sin(a)} 0 {a / 7} 0.5 1\n" for a in angle) + "v 9 9 9 0 0 0\n"
+    (tmp_path / "m.obj").write_text(text + "f " + " ".join(map(str, range(1, n + 1))))
+    scan = read_scan(tmp_path / "m.obj")
+    assert (len(scan), len(scan.triangles)) == (n + 1, n - 2)
+    np.testing.assert_allclose(area(scan), n / 2 * np.sin(2 * np.pi / n))
+    np.testing.assert_allclose(scan.colors[:-1], np.column_stack([angle / 7, 0 * angle + 0.5, 0 * angle + 1]))
+
+
+@pytest.mark.parametrize("face", ["f 1 2 9", "f 1 2 -9", "f 0 1 2", "f", "f 1 2 x"])
+def test_faces_that_make_no_sense(tmp_path, face):
+    (tmp_path / "m.obj").write_text(f"{POINTS}{FORMS['plain']}{face}\n")
+    with pytest.raises(FileFormatError, match=r"m\.obj: not a valid \.obj file"):
+        read_scan(tmp_path / "m.obj")
+
+
+def test_an_obj_file_of_points_is_a_cloud(tmp_path):
+    (tmp_path / "m.obj").write_text(POINTS)
+    assert (len(read_scan(tmp_path / "m.obj")), len(read_scan(tmp_path / "m.obj").triangles)) == (8, 0)
