@@ -15,7 +15,7 @@ from .interop.clouds import Cloud, cloud_points
 from .parameters import UNWRITTEN, Parameters, is_own
 from .points import Points
 from .report import STOPPED_BY_CALLER, IterationRecord, Report, warn
-from .skeleton import Skeleton
+from .skeleton import Skeleton, of_input
 from .state import Contraction
 
 OnIteration: TypeAlias = Callable[[IterationRecord], bool | None]
@@ -177,7 +177,8 @@ class Pipeline(Generic[Produced]):
         Skeleton, Contraction or cloud
             Whatever the last filter gives.
         """
-        data, report = cloud, cloud.report if isinstance(cloud, FLOWS[1:]) else Report()
+        data = cloud.whole if isinstance(cloud, Skeleton) else cloud
+        report = cloud.report if isinstance(cloud, FLOWS[1:]) else Report()
         told = report.warnings
         watch = _watch(on_iteration, on_state)
         for stage in self.stages:
@@ -194,7 +195,7 @@ class Pipeline(Generic[Produced]):
                 data = copy(data)  # as it is: to check it once more would take longer
                 object.__setattr__(data, "report", report)
         warn(message for message in report.warnings if message not in told)
-        produced: Produced = data
+        produced: Any = of_input(data) if isinstance(data, Skeleton) else data
         return produced
 
     def check_complete(self) -> None:

@@ -10,7 +10,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from .errors import StageError
-from .interop.clouds import cloud_counts, cloud_points, to_point_cloud
+from .interop.clouds import cloud_counts, surface_mesh, to_point_cloud
+from .numerics.area_sampling import SurfaceSample, sample_by_area, vertices_mislead
 from .numerics.frame import Frame, not_finite, to_working_frame
 from .numerics.grid_sampling import sample_cloud
 from .numerics.neighbourhoods import principal, row_medians
@@ -23,6 +24,9 @@ Some = TypeVar("Some", bound="Representatives")
 # Fitted: median sphericity of clean neighbourhoods at most, and of nothing but noise.
 CLEAN_SPHERICITY, NOISE_SPHERICITY = 0.2, 0.35
 
+ENOUGH = 2400  # fitted: points on a body without thin parts; fewer are not thinned
+MOST_CONTRACTED = 25000  # speed: points of most clouds that are contracted
+
 
 def default_k(n: int) -> int:
     """Neighbours per point, itself included: 16 from 4096 points on, fewer by the cube root below, at least 8.
@@ -30,6 +34,16 @@ def default_k(n: int) -> int:
     In a sparse cloud 16 neighbours would reach across thin parts.
     """
     return min(int(np.clip(np.floor(16 * np.cbrt(n / 4096) + 0.5), 8, 16)), n)
+
+
+def default_size(n: int) -> int:
+    """Points to contract: at most 25000, but 64 times the square root of their number from 152588 points on.
+
+    More points make the axis hardly more exact, since neither noise nor the thickness of parts shrinks with their
+    spacing; they only cost time.
+    """
+    size: int = max(MOST_CONTRACTED, round(64 * np.sqrt(n)))
+    return min(n, size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +116,7 @@ class Points(Representatives):
     Attributes
     ----------
     points : (N, 3) float64 array
-        The input.
+        The input; of a mesh that is sampled its vertices, and the sample after them.
     representative_of_point : (N,) int array
         Row of `cloud` of each input point; -1 if it is not finite.
     outlier, sampled : (N,) bool array
@@ -154,23 +168,30 @@ class Points(Representatives):
 
     @classmethod
     def of(
-        cls, cloud: Any, size: Callable[[int], int] = int, frame: str = "spread", drop_invalid: bool = False
+        cls, cloud: Any, size: Callable[[int], int] = int, by: str = "spread", drop: bool = False, sample: Any = "auto"
     ) -> Points:
         """The points of a cloud, or about `size(n)` of n from the cells of a grid if n is more than twice as large.
 
+        Of a mesh they are those `on_surface`, if there are some, and each vertex follows the nearest.
         InvalidCloudError as of `RingBuilder`.
         """
-        points = cloud_points(cloud)
+        points, _ = mesh = surface_mesh(cloud)
         finite = finite_rows(points)
-        if not (drop_invalid or finite.all()):
+        if not (drop or finite.all()):
             raise not_finite(int((~finite).sum()), len(points), int(finite.argmin()))
         counts, n, dropped = cloud_counts(cloud, finite)
         given = points if finite.all() else points[finite]
-        kept, position, counts = sample_cloud(given, size(n), counts)
+        surface = on_surface(mesh, sample)[0]
+        if len(surface):
+            kept, position, counts = sample_cloud(surface, size(len(surface)))
+            kept, position = kept + len(given), np.append(position[cKDTree(surface).query(given)[1]], position)
+            points, finite = np.append(points, surface, axis=0), np.append(finite, np.ones(len(surface), bool))
+        else:
+            kept, position, counts = sample_cloud(given, size(n), counts)
         kept, place = np.flatnonzero(finite)[kept], np.full(len(points), -1)
         place[finite] = position
-        report = Report(n_input=n + dropped, n_dropped=dropped, n_sampled=len(kept))
-        return cls._of_rows(points, kept, place, counts, frame, report)
+        report = Report(n_input=n + dropped, n_dropped=dropped, n_by_area=len(surface), n_sampled=len(kept))
+        return cls._of_rows(points, kept, place, counts, by, report)
 
     @classmethod
     def _of_rows(
@@ -261,6 +282,20 @@ def _measured(cloud: np.ndarray, neighbours: np.ndarray) -> dict[str, Any]:
         spread=spread,
         ring_normals=normals,
     )
+
+
+def on_surface(mesh: tuple[np.ndarray, np.ndarray], sample: Any = "auto") -> SurfaceSample:
+    """The points that stand for a mesh, by the option `sample` of the Sampler: none where its vertices do."""
+    if sample == "auto" and vertices_mislead(mesh, default_k, ENOUGH):
+        sample = MOST_CONTRACTED
+    return sample_by_area(*mesh, 0 if isinstance(sample, str) else int(sample))
+
+
+def surface_points(cloud: Any) -> np.ndarray:
+    """The points of a cloud, or those that stand for a mesh by default, (N, 3) float64 array."""
+    mesh = surface_mesh(cloud)
+    places = on_surface(mesh)[0]
+    return places if len(places) else mesh.vertices
 
 
 def noise_share(spread: np.ndarray, neighbours: np.ndarray) -> np.ndarray:

@@ -127,9 +127,10 @@ class Report:
 
     Attributes
     ----------
-    n_input, n_dropped, n_sampled, n_outliers, n_distinct, n_contracted : int
-        Numbers of input points, points dropped as not finite, points of the sample of a large cloud (all of a small
-        one), outliers, distinct points of the sample, and contracted points.
+    n_input, n_dropped, n_by_area, n_sampled, n_outliers, n_distinct, n_contracted : int
+        Numbers of input points, points dropped as not finite, points by area that stand for a mesh (0 if its vertices
+        do), points of the sample of a large cloud (all of a small one), outliers, distinct points of the sample, and
+        contracted points.
     noise : float
         Mean share of noise of the neighbourhoods, from 0 to 1.
     n_loops_closed, n_cuts, n_bridges : int
@@ -168,6 +169,7 @@ class Report:
 
     n_input: int = 0
     n_dropped: int = 0
+    n_by_area: int = 0
     n_sampled: int = 0
     n_outliers: int = 0
     n_distinct: int = 0
@@ -223,7 +225,7 @@ class Report:
     @property
     def is_sampled(self) -> bool:
         """Whether a sample represents the cloud."""
-        return 0 < self.n_sampled < self.n_input - self.n_dropped
+        return 0 < self.n_sampled < (self.n_by_area or self.n_input - self.n_dropped)
 
     @property
     def uncertain(self) -> tuple[Decision, ...]:

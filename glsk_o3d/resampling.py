@@ -110,7 +110,8 @@ def with_support(
 
     The other arguments are those of `support`.
     """
-    points = skeleton.points[skeleton.vertex_of_point >= 0]
+    whole = skeleton.whole
+    points = whole.points[whole.vertex_of_point >= 0][-skeleton.report.n_by_area :]  # of a mesh, those by area
     others, rng = [], np.random.default_rng(seed)
     for draw in range(draws):
         if on_draw is not None:

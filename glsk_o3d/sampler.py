@@ -5,8 +5,7 @@ from typing import Any, ClassVar, Literal
 
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
-from .points import Points
-from .thinner import default_size
+from .points import Points, default_size
 
 
 @documented
@@ -15,7 +14,8 @@ class Sampler(Filter[Points]):
     """Bring a cloud into its working frame: centred, longest side 1.6, in Morton order and without duplicates.
 
     Points that differ by rounding become one. The sample of a large cloud has the points nearest to the means of the
-    cells of a grid; other points follow that of their cell. Results of a pipeline are in the user's order and units.
+    cells of a grid; other points follow that of their cell. A mesh whose vertices do not show its surface is sampled by
+    area; each vertex follows the nearest point. Results of a pipeline are in the user's order and units.
 
     Raises
     ------
@@ -46,10 +46,19 @@ class Sampler(Filter[Points]):
         "What percentages and weights refer to: the box with the spread of the points, or the axis-aligned one.",
         choices=("spread", "box"),
     )
+    sample: int | Literal["auto", "vertices"] = parameter(
+        "auto",
+        "Points by area that stand for a mesh. 'auto' is 25000 if most of its area is in triangles longer than the "
+        "neighbourhoods of their corners; else, and with 'vertices', the points are its vertices.",
+        type="int",
+        unit="points",
+        low=8,
+        choices=("auto", "vertices"),
+    )
     drop_invalid: bool = parameter(False, "Drop points with NaN or infinite coordinates instead of refusing.")
 
     def _run(self, cloud: Any, watch: Watch | None) -> Points:
-        return Points.of(cloud, self.sample_size, self.frame, self.drop_invalid)
+        return Points.of(cloud, self.sample_size, self.frame, self.drop_invalid, self.sample)
 
     def sample_size(self, n: int) -> int:
         """Size of the sample of n points if n is more than twice as large."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -151,6 +151,11 @@ class Skeleton:
         return np.arange(len(self.points))
 
     @property
+    def whole(self) -> Skeleton:
+        """This with the points by area of a sampled mesh behind its vertices, if a pipeline has just made it."""
+        return vars(self).get("_whole", self)
+
+    @property
     def leaves(self) -> np.ndarray:
         """Vertices with one edge, int array."""
         return np.flatnonzero(self.degree == 1)
@@ -233,6 +238,17 @@ class Skeleton:
         lines.lines = o3d.utility.Vector2iVector(np.ascontiguousarray(self.edges, np.int32))
         lines.paint_uniform_color(paint)
         return lines
+
+
+def of_input(skeleton: Skeleton) -> Skeleton:
+    """A skeleton with the points that were given alone: without those by area that stood for a mesh."""
+    n, report = len(skeleton.points), skeleton.report
+    if not report.n_by_area or n != report.n_input + report.n_by_area:
+        return skeleton
+    some = {name: getattr(skeleton, name)[: report.n_input] for name in ("points", "normals", "vertex_of_point")}
+    given = replace(skeleton, **some)
+    vars(given)["_whole"] = skeleton
+    return given
 
 
 def as_color(color: Any, words: str) -> np.ndarray:

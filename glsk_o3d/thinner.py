@@ -13,10 +13,9 @@ from .numerics.rows import reach_next_rows
 from .numerics.vectors import TINY, norm
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
-from .points import Points, default_k
+from .points import ENOUGH, Points, default_k, default_size
 
 ASK_AGAIN = 0.25  # speed: share of the points left, below which the neighbours are looked up anew
-ENOUGH = 2400  # fitted: points on a body without thin parts; fewer are not thinned
 PACKED = 0.42  # measured: points left on an area of 1 if none are to be nearer than 1
 SMOOTHING = 8  # fitted: steps over which the thickness of parts is averaged
 LEAST_MERGED = 0.001  # measured: share of the points that a round must merge: along a spiral it is one each
@@ -24,16 +23,6 @@ LEAST_AROUND = 3  # derived: points around the thinnest part
 WIDER_STEPS = 3  # measured: steps from neighbour to neighbour: fewer see no more than noise, more see other parts
 SHEET_FROM = 0.4  # measured: second over third variance of these, from which on they are a sheet; tubes of 10 have it
 WIDER_BIAS = 1.25  # measured: on tubes with 18 to 80 points around them, noise of up to a fifth of their spacing
-
-
-def default_size(n: int) -> int:
-    """Points to contract: at most 25000, but 64 times the square root of their number from 152588 points on.
-
-    More points make the axis hardly more exact, since neither noise nor the thickness of parts shrinks with their
-    spacing; they only cost time.
-    """
-    size: int = max(25000, round(64 * np.sqrt(n)))
-    return min(n, size)
 
 
 @documented
@@ -85,7 +74,11 @@ class Thinner(Filter[Points]):
         if report.is_sampled and self.thin_to != "auto" and self.thin_to > report.n_sampled:
             told = f"Thinner.thin_to = {self.thin_to}: the Sampler left {report.n_sampled} points: set Sampler.size"
             points = replace(points, report=report.with_warning(told))
-        most = default_size(report.n_input - report.n_dropped) if self.thin_to == "auto" else self.thin_to
+        most = (
+            default_size(max(report.n_input - report.n_dropped, report.n_by_area))
+            if self.thin_to == "auto"
+            else self.thin_to
+        )
         if most < len(points):
             points = _merged(points, thin(points.cloud[points.survivors], points.neighbours, most))
         return points

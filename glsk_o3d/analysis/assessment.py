@@ -9,13 +9,13 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from ..errors import InvalidCloudError, InvalidParameterError
-from ..interop.clouds import cloud_points
 from ..numerics.cycles import inscribed_circle, minimum_cycle_basis
 from ..numerics.frame import check_extent
 from ..numerics.groups import component_labels, group_median, group_sum
 from ..numerics.neighbourhoods import nearest_neighbours, plane_axes
 from ..numerics.polylines import arc_lengths, place_at
 from ..numerics.vectors import Floats, Ints
+from ..points import surface_points
 from ..skeleton import Skeleton
 
 CLUSTER_NEIGHBOURS = 16  # fitted: of each point, in the graph whose components are the clusters of a cloud
@@ -95,7 +95,7 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
     >>> found.boundedness, found.topology
     (1.0, 1.0)
     """
-    cloud = cloud_points(points)
+    cloud = surface_points(points)
     cloud = np.unique(cloud[np.isfinite(cloud).all(axis=1)], axis=0)
     if not skeleton.length > 0:
         raise InvalidParameterError("the skeleton has no edge with a length: there is no curve to assess")

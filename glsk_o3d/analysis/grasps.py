@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import InvalidParameterError, SkeletonWarning
-from ..interop.clouds import cloud_points
 from ..numerics.groups import group_rank
 from ..numerics.polylines import arc_lengths
 from ..parameters import check_number
+from ..points import surface_points
 from ..report import outside
 from ..skeleton import Skeleton
 from .curves import check_places
@@ -224,7 +224,7 @@ def _object(skeleton: Skeleton, cloud: Any) -> np.ndarray:
         raise InvalidParameterError(
             "this skeleton has no points of the object: give its cloud (--cloud), or cloud=() to check nothing"
         )
-    points = skeleton.points if cloud is None else cloud_points(cloud)
+    points = skeleton.whole.points if cloud is None else surface_points(cloud)
     return points[np.isfinite(points).all(axis=1)]
 
 

@@ -29,6 +29,7 @@ def summary(skeleton: Skeleton, seconds: float) -> dict[str, Any]:
     return {
         "points": report.n_input,
         "dropped": report.n_dropped,
+        "by_area": report.n_by_area,
         "sampled": report.n_sampled,
         "outliers": report.n_outliers,
         "distinct": report.n_distinct,

@@ -9,7 +9,7 @@ from typing import Any
 
 from ..driver import PipelineChoice, chosen_pipeline
 from ..errors import BatchError
-from ..interop.clouds import cloud_points, open3d_class
+from ..interop.clouds import open3d_class, surface_mesh
 from ..parameters import check_number
 from ..pipeline import Pipeline
 from ..recipes import from_recipe, to_recipe
@@ -115,7 +115,7 @@ class Skeletonizer:
 
 def _sent(cloud: Any) -> Any:
     """What another process is sent of a cloud: Open3D's others than tensor clouds cannot be."""
-    return cloud if open3d_class(cloud) == ("PointCloud", True) else cloud_points(cloud)
+    return cloud if open3d_class(cloud) == ("PointCloud", True) else surface_mesh(cloud)
 
 
 def _skeletonized(recipe: dict[str, Any], cloud: Any) -> Skeleton:

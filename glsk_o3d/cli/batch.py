@@ -26,6 +26,7 @@ def batch(
     recursive: Annotated[bool, Option("--recursive", "-r", help="Take also the sub-folders of folders.")] = False,
     pipeline: options.PipelineName = "default",
     settings: options.Settings = None,
+    sample: options.Sample = None,
     drop_invalid: options.DropInvalid = False,
     cut_loops: options.CutLoops = False,
     workers: Annotated[int | None, option("N", "Processes; by default one for each core at hand.", min=1)] = None,
@@ -51,7 +52,7 @@ def batch(
     from .overrides import choose
 
     what: dict[str, Any] = dict(
-        pipeline=choose(pipeline, settings, drop_invalid),
+        pipeline=choose(pipeline, settings, drop_invalid, sample),
         formats=[word.strip() for word in formats.split(",") if word.strip()],
         preview=preview,
         cut_loops=cut_loops,

@@ -38,12 +38,15 @@ def root_option(help: str) -> Any:
 
 SkeletonFile = Annotated[Path, argument("SKELETON", "A skeleton in a file: json, npz, ply, obj or swc.")]
 ScanFile = Annotated[
-    Path, argument("SCAN", "A cloud: ply, pcd, csv, txt, asc, xyz, las, laz, e57; or a mesh: obj, stl.")
+    Path, argument("SCAN", "A cloud: ply, pcd, csv, txt, asc, xyz, las, laz, e57; or a mesh: ply, obj, stl, off, glb.")
 ]
 Where = Annotated[
     str | None, option("CONDITION", "Take only points such as 'classification == 5'; 'glsk info' says what a file has.")
 ]
 DropInvalid = Annotated[bool, Option("--drop-invalid", help="Drop points with NaN or infinite coordinates.")]
+Sample = Annotated[
+    int | None, option("N", "Sample a mesh with N points by area, even if its vertices lie close together.", min=8)
+]
 
 PipelineName = Annotated[
     str, option("NAME|FILE", "default, tree, wen2024, cao2010, a plugin's, or a recipe or a result in json.")

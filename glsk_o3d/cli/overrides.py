@@ -13,9 +13,12 @@ from ..recipes.catalogue import catalogue, serves
 _BOOLS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
 
 
-def choose(pipeline: str, settings: Iterable[str] | None = (), drop_invalid: bool = False) -> Pipeline[Any]:
+def choose(
+    pipeline: str, settings: Iterable[str] | None = (), drop_invalid: bool = False, sample: int | None = None
+) -> Pipeline[Any]:
     """The pipeline, from a cloud to a skeleton, that the options of a command ask for."""
-    return override(as_pipeline(pipeline), [*(settings or ()), *["drop_invalid=true"] * drop_invalid])
+    flags = ["drop_invalid=true"] * drop_invalid + [f"Sampler.sample={sample}"] * (sample is not None)
+    return override(as_pipeline(pipeline), [*(settings or ()), *flags])
 
 
 def override(pipeline: Pipeline[Any], settings: Iterable[str]) -> Pipeline[Any]:

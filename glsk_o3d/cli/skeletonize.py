@@ -33,6 +33,7 @@ def skeletonize(
     support: Annotated[
         int | None, option("SAMPLES", "Also skeletonise so many samples, and say what they share; 8 are enough.", min=2)
     ] = None,
+    sample: options.Sample = None,
     drop_invalid: options.DropInvalid = False,
     cut_loops: options.CutLoops = False,
 ) -> None:
@@ -47,7 +48,7 @@ def skeletonize(
     from ..resampling import with_support
     from .overrides import choose
 
-    chosen = choose(pipeline, settings, drop_invalid)
+    chosen = choose(pipeline, settings, drop_invalid, sample)
 
     def label(skeleton: Skeleton, path: Path) -> None:
         annotate_file(skeleton, scan, path, where=where)

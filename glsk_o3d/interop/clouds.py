@@ -34,6 +34,26 @@ class CountedPoints(NamedTuple):
     counts: np.ndarray  # (N,)
 
 
+class SurfaceMesh(NamedTuple):
+    """A mesh without Open3D: vertices, and triangles between them; without triangles it is a cloud."""
+
+    vertices: np.ndarray  # (N, 3)
+    triangles: np.ndarray  # (T, 3) int
+
+
+def surface_mesh(cloud: Any) -> SurfaceMesh:
+    """What `cloud_points` gives, and the triangles; InvalidCloudError also for one with a corner that is missing."""
+    points, held, tensor = cloud_points(cloud), (), open3d_class(cloud) == ("TriangleMesh", True)
+    if tensor and "indices" in cloud.triangle:
+        held = cloud.triangle.indices.cpu().numpy()
+    elif isinstance(cloud, SurfaceMesh) or (open3d_class(cloud)[0] == "TriangleMesh" and not tensor):
+        held = cloud.triangles
+    triangles = np.asarray(held, np.int64).reshape(-1, 3)
+    if not ((triangles >= 0) & (triangles < len(points))).all():
+        raise InvalidCloudError(f"a triangle has a corner that is none of the {len(points)} vertices of its mesh")
+    return SurfaceMesh(points, triangles)
+
+
 def cloud_points(cloud: Any) -> np.ndarray:
     """The points of anything that carries points.
 
@@ -100,8 +120,8 @@ def cloud_counts(cloud: Any, finite: np.ndarray) -> tuple[np.ndarray | None, int
 
 def _held(cloud: Any) -> Any:
     """The array-like in an Open3D object, or `cloud` itself; knows Open3D's classes by name, so as not to import it."""
-    if isinstance(cloud, CountedPoints):
-        return cloud.points
+    if isinstance(cloud, CountedPoints | SurfaceMesh):
+        return cloud[0]
     name, tensor = open3d_class(cloud)
     if name == "Tensor":
         return cloud.cpu().numpy()

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import InvalidParameterError, did_you_mean
 from ..interop.packages import import_open3d
+from ..points import on_surface
 
 COLOR_CHANNELS = ["red", "green", "blue"]
 NORMAL_NAMES = ["nx", "ny", "nz"]
@@ -44,15 +45,21 @@ class Scan:
         return len(self.positions)
 
     def __getitem__(self, rows: np.ndarray) -> Scan:
-        """Some of the points, without triangles."""
+        """Some of the points, and the triangles between them if `rows` are a bool array."""
+        whole = rows[self.triangles].all(axis=1) if rows.dtype == bool else slice(0)
         return replace(
             self,
             positions=self.positions[rows],
             colors=None if self.colors is None else self.colors[rows],
             normals=None if self.normals is None else self.normals[rows],
             attributes={name: values[rows] for name, values in self.attributes.items()},
-            triangles=NO_TRIANGLES,
+            triangles=(np.cumsum(rows) - 1)[self.triangles[whole]],
         )
+
+    def by_area(self) -> Scan:
+        """The points that stand for a mesh by default, see `Sampler`, with normals, and all else as a corner has it."""
+        places, corners, normals, _ = on_surface((self.positions, self.triangles))
+        return replace(self[corners[:, 0]], positions=places, normals=normals) if len(places) else self
 
     def chosen(self, where: str) -> np.ndarray:
         """For which points a condition holds, (N,) bool array; InvalidParameterError if it is none, or names what the

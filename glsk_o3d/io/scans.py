@@ -51,7 +51,7 @@ _SCAN_READERS: dict[str, Reader] = {
 
 
 def read_cloud(path: str | os.PathLike[str], *, where: str | None = None) -> Any:
-    """Read a point cloud, or the vertices of a mesh.
+    """Read a point cloud, or points on a mesh: its vertices or, where `Sampler` would take one, a sample by area.
 
     All coordinates keep their digits.
 
@@ -67,8 +67,8 @@ def read_cloud(path: str | os.PathLike[str], *, where: str | None = None) -> Any
     Returns
     -------
     open3d.geometry.PointCloud
-        With the normals and colours of the file; `read_tensor_cloud` reads all attributes. STL repeats a vertex for
-        every triangle around it.
+        With the normals and colours of the file; `read_tensor_cloud` reads all attributes. A sample has the normals of
+        the triangles, and all else from one of their corners. STL repeats a vertex for every triangle around it.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def read_cloud(path: str | os.PathLike[str], *, where: str | None = None) -> Any
     ...     len(read_cloud(path, where="label == 2").points)
     2
     """
-    return read_scan(path, where).to_legacy()
+    return read_scan(path, where).by_area().to_legacy()
 
 
 def read_tensor_cloud(path: str | os.PathLike[str], *, where: str | None = None) -> Any:
@@ -115,7 +115,7 @@ def read_tensor_cloud(path: str | os.PathLike[str], *, where: str | None = None)
     ...     read_tensor_cloud(f"{folder}/scan.csv").point.label.flatten().numpy()
     array([1, 2], dtype=int32)
     """
-    return read_scan(path, where).to_tensor()
+    return read_scan(path, where).by_area().to_tensor()
 
 
 def read_scan(path: str | os.PathLike[str], where: str | None = None) -> Scan:

@@ -10,7 +10,7 @@ import numpy as np
 from ..analysis.segmentation import vertex_of_cloud
 from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ..interop.atomic import check_ending, write_atomically
-from ..interop.clouds import SAMPLE_COUNT, CountedPoints
+from ..interop.clouds import SAMPLE_COUNT, CountedPoints, SurfaceMesh
 from ..numerics.frame import not_finite
 from ..numerics.grid_sampling import sample_blocks
 from ..pipeline import Pipeline
@@ -80,7 +80,7 @@ def _sampled(
     def blocks() -> Iterator[np.ndarray]:
         nonlocal dropped
         at = first = dropped = 0
-        for block in read_blocks(path, where=where, bare=True):
+        for block in map(Scan.by_area, read_blocks(path, where=where, bare=True)):
             finite = np.isfinite(block.positions).all(axis=1)
             if not (dropped or finite.all()):
                 first = at + int(np.argmin(finite))
@@ -91,18 +91,15 @@ def _sampled(
         if dropped and not drop_invalid:
             raise not_finite(dropped, at, first)
 
-    if promised_points(path) is None:  # it is one block: no need to read it again and again
-        whole = list(blocks())
-        points, counts = sample_blocks(lambda: whole, size)
-    else:
-        points, counts = sample_blocks(blocks, size)
+    whole = list(blocks()) if promised_points(path) is None else None  # one block: not to be read again and again
+    points, counts = sample_blocks(blocks if whole is None else lambda: whole, size)
     if len(points) == 0:
         raise InvalidCloudError(f"{os.fspath(path)}: there is no point with finite coordinates")
     return points, counts, dropped
 
 
 def points_for(pipeline: Pipeline[Any], path: str | os.PathLike[str], where: str | None = None) -> Any:
-    """What a pipeline takes of a file: its (N, 3) points, or a sample of them; without Open3D, but of OBJ and STL.
+    """What a pipeline takes of a file: its points and triangles, or a sample of the points.
 
     The sample, as of `read_sample`, is taken where the file has more than ten million points and the pipeline does not
     take all. Where the pipeline drops points that are not finite, the last one is NaN and stands for them, so that its
@@ -114,7 +111,8 @@ def points_for(pipeline: Pipeline[Any], path: str | os.PathLike[str], where: str
         or sampler.sample_size(LARGE_CLOUD) >= LARGE_CLOUD
         or (promised_points(path) or 0) <= LARGE_CLOUD
     ):
-        return read_scan(path, where).positions
+        scan = read_scan(path, where)
+        return SurfaceMesh(scan.positions, scan.triangles) if len(scan.triangles) else scan.positions
     points, counts, dropped = _sampled(path, sampler.sample_size, where, sampler.drop_invalid)
     if dropped:
         points, counts = np.append(points, np.full((1, 3), np.nan), axis=0), np.append(counts, dropped)

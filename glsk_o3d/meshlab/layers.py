@@ -12,11 +12,10 @@ import numpy as np
 
 from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ..interop.atomic import write_atomically
-from ..interop.clouds import cloud_points
+from ..interop.clouds import SurfaceMesh, surface_mesh
 from ..interop.packages import require
 from ..io.formats import ply
 from ..io.formats.graphs import graph_skeleton
-from ..io.scan import COLOR_CHANNELS
 from ..io.scans import read_scan
 from ..io.skeletons import save_skeleton, skeleton_ending
 from ..skeleton import Skeleton
@@ -49,7 +48,8 @@ class Layer:
         if isinstance(data, Skeleton):
             facts: dict[str, Any] = dict(edges=data.edges, scalars=data.radii, skeleton=data)
             return cls(data.vertices, label=label, source=source, **facts)
-        return cls(cloud_points(data), label=label, source=source)
+        vertices, faces = surface_mesh(data)
+        return cls(vertices, faces=faces if len(faces) else None, label=label, source=source)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Layer:
@@ -97,12 +97,12 @@ class Layer:
         mine, its = (none if layer.edges is None else layer.edges for layer in (self, other))
         return np.array_equal(self.vertices, other.vertices) and np.array_equal(mine, its)
 
-    def cloud(self) -> np.ndarray:
-        """The vertices of a layer that is a scan; InvalidCloudError for a skeleton."""
+    def cloud(self) -> SurfaceMesh:
+        """The vertices and faces of a layer that is a scan; InvalidCloudError for a skeleton."""
         if self.is_skeleton:
             what = "is a skeleton or another line drawing: make the scan the current layer"
             raise InvalidCloudError(f"the current layer ({self.label}) {what}")
-        return self.vertices
+        return SurfaceMesh(self.vertices, () if self.faces is None else self.faces)  # type: ignore[arg-type]
 
     def summary(self) -> dict[str, Any]:
         """The layer in a few numbers, as MeshLab's filters return them."""
@@ -156,15 +156,12 @@ class Layer:
         )
 
     def _write_ply(self, path: Path) -> None:
-        columns = dict(zip("xyz", self.vertices.T.astype(float), strict=True))
-        if self.normals is not None:
-            columns |= dict(zip(("nx", "ny", "nz"), self.normals.T.astype(float), strict=True))
-        if self.colors is not None:
-            shades = np.round(255 * self.colors[:, :3]).astype(np.uint8)
-            columns |= dict(zip(COLOR_CHANNELS, shades.T, strict=True))
-        if self.scalars is not None:
-            columns["quality"] = np.asarray(self.scalars, float)
-        path.write_bytes(ply.content(columns, self.faces if self.faces is not None and len(self.faces) else None))
+        colors = None if self.colors is None else self.colors[:, :3]
+        known = {"positions": self.vertices, "normals": self.normals, "colors": colors, "quality": self.scalars}
+        held = {name: np.asarray(values, float) for name, values in known.items() if values is not None}
+        path.write_bytes(
+            ply.content(ply.columns_of(held), self.faces if self.faces is not None and len(self.faces) else None)
+        )
 
 
 def check_ending(path: Path, what: str) -> None:

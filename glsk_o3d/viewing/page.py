@@ -49,7 +49,7 @@ def save_report(skeleton: Skeleton, path: str | os.PathLike[str], *, title: str 
     >>> glsk.save_report(glsk.skeletonize(torus(600).points), "report.html", title="A torus")  # doctest: +SKIP
     """
     check_ending(path, "report is a page", ".html", ".htm")
-    page = _page(skeleton, title).encode("utf-8", "replace")  # a file name may be no Unicode
+    page = _page(skeleton.whole, title).encode("utf-8", "replace")  # a file name may be no Unicode
     write_atomically(path, lambda temporary: temporary.write_bytes(page))
 
 

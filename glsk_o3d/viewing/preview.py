@@ -66,7 +66,7 @@ def save_preview(skeleton: Skeleton, path: str | os.PathLike[str], *, title: str
 
 def draw(skeleton: Skeleton, title: str | None = None) -> Any:
     """The figure, not yet in a file."""
-    cloud = skeleton.points[figures.thinned(skeleton.points, figures.MOST_DRAWN_POINTS)]
+    cloud = skeleton.whole.points[figures.thinned(skeleton.whole.points, figures.MOST_DRAWN_POINTS)]
     centre, extent = figures.room(np.concatenate([cloud, skeleton.vertices]))
     head, foot, report = 0.58 if title else 0.25, 0.34, skeleton.report
     room = _LINE_HEIGHT * (_MOST_LINES * _MOST_WARNINGS + 1) if report.warnings else 0

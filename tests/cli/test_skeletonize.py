@@ -21,6 +21,24 @@ def test_points_that_are_dropped(invoke, scans, tmp_path):
     assert (read_skeleton(tmp_path / "s.npz").vertex_of_point < 0).nonzero()[0].tolist() == [3, 8]
 
 
+def test_meshes_are_sampled(invoke, tmp_path):
+    box = "".join(f"v {x} {y} {z}\n" for x in (0, 10) for y in (0, 1) for z in (0, 1))
+    quads = ("1 2 4 3", "5 7 8 6", "1 5 6 2", "3 4 8 7", "1 3 7 5", "2 6 8 4")
+    (tmp_path / "bar.obj").write_text(box + "".join(f"f {quad}\n" for quad in quads))
+    result = invoke("skeletonize", "bar.obj", "-o", "s.json", "--report", "r.html", "--labelled", "l.ply")
+    assert re.search(r"^by area +25,?000$", result.stdout, re.MULTILINE)
+    found = read_skeleton(tmp_path / "s.json")
+    assert (found.report.n_input, found.report.n_by_area, len(found.vertex_of_point)) == (8, 25000, 8)
+    assert abs(found.length - 10) < 1  # half a width at either end
+    assert np.abs(found.vertices[:, 1:] - 0.5).max() < 0.1
+    assert "25000 by area" in (tmp_path / "r.html").read_text("utf-8")
+    assert len(read_tensor_cloud(tmp_path / "l.ply").point.branch) == 8
+    facts = json.loads(invoke("skeletonize", "bar.obj", "-o", "s.ply", "--sample", "3000", "--json").stdout)
+    assert (facts["points"], facts["by_area"], facts["leaves"]) == (8, 3000, 2)
+    invoke("batch", "bar.obj", "-o", "out", "--format", "json", "--sample", "2000")
+    assert read_skeleton(tmp_path / "out" / "bar.json").report.n_by_area == 2000
+
+
 def test_one_file_that_cannot_be_written_does_not_cost_the_others(invoke, scans, tmp_path, monkeypatch):
     words = ("skeletonize", scans / "ring.ply", "-o", "s.swc", "-o", "s.json")
     with monkeypatch.context() as patch:

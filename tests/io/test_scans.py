@@ -1,6 +1,8 @@
 """Scans from files: whole or in blocks they are the same, and of one that is damaged nothing is believed."""
 
+import json
 import os
+import struct
 
 import numpy as np
 import open3d as o3d
@@ -10,7 +12,7 @@ from glsk_o3d import save_skeleton
 from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from glsk_o3d.io.formats.text_tables import holds_points
 from glsk_o3d.io.paths import CLOUD_ENDINGS, MESH_ENDINGS
-from glsk_o3d.io.scans import promised_points, read_blocks, read_cloud, read_mesh, read_scan
+from glsk_o3d.io.scans import promised_points, read_blocks, read_cloud, read_mesh, read_scan, read_tensor_cloud
 from glsk_o3d.io.skeletons import READABLE, read_skeleton, read_truth
 
 
@@ -26,16 +28,86 @@ def test_clouds_that_open3d_writes(cloud, xyz, tmp_path, name, options):
     assert back.has_colors() == (kind != "xyz")
 
 
-@pytest.mark.parametrize("ending", ["obj", "stl", "ply"])
+@pytest.mark.parametrize("ending", ["obj", "stl", "ply", "off"])
 @pytest.mark.parametrize(("resolution", "coarse"), [(5, True), (40, False)])
-def test_meshes_give_their_vertices(tmp_path, caplog, ending, resolution, coarse):
+def test_meshes_give_their_vertices_or_a_sample(tmp_path, ending, resolution, coarse):
     mesh, path = o3d.geometry.TriangleMesh.create_sphere(2.0, resolution), tmp_path / f"m.{ending}"
     mesh.compute_vertex_normals()
     o3d.io.write_triangle_mesh(str(path), mesh)
     centres = (np.asarray(it.vertices)[np.asarray(it.triangles)].mean(axis=1) for it in (read_mesh(path), mesh))
     np.testing.assert_allclose(*(np.sort(each, axis=0) for each in centres), atol=1e-3)
-    read_scan(path)
-    assert ("sample_points_uniformly" in caplog.text) == coarse
+    assert len(read_scan(path)) >= len(mesh.vertices)
+    assert (len(read_cloud(path).points) == 25000) == coarse
+
+
+def test_a_sample_has_what_a_corner_has(tmp_path):
+    mesh = o3d.geometry.TriangleMesh.create_box(1, 2, 3)
+    path = tmp_path / "m.ply"
+    corners = np.asarray(mesh.vertices)
+    with path.open("w") as stream:
+        stream.write("ply\nformat ascii 1.0\nelement vertex 8\n")
+        stream.write("".join(f"property double {name}\n" for name in "xyz") + "property int label\n")
+        stream.write("element face 12\nproperty list uchar int vertex_indices\nend_header\n")
+        stream.writelines(f"{x} {y} {z} {x == 0:d}\n" for x, y, z in corners)
+        stream.writelines(f"3 {a} {b} {c}\n" for a, b, c in np.asarray(mesh.triangles))
+    cloud = read_tensor_cloud(path)
+    places, normals = cloud.point.positions.numpy(), cloud.point.normals.numpy()
+    side = np.argmax(np.abs(normals), axis=1)
+    np.testing.assert_allclose(np.abs(normals).sum(axis=1), 1)
+    outer = np.where(normals.sum(axis=1) > 0, np.array([1, 2, 3])[side], 0)
+    np.testing.assert_allclose(places[np.arange(len(places)), side], outer, atol=1e-12)  # they point outward
+    label = cloud.point.label.numpy()[:, 0]
+    assert (label[normals[:, 0] == -1] == 1).all()
+    assert (label[normals[:, 0] == 1] == 0).all()
+    half = read_scan(path, "x > 0.5")
+    assert (len(half), len(half.triangles)) == (4, 2)
+    np.testing.assert_allclose(half.positions[half.triangles][..., 0], 1)
+
+
+def glb(nodes):
+    """A scene: one cube for every place and scale."""
+    mesh = o3d.geometry.TriangleMesh.create_box()
+    places = np.asarray(mesh.vertices, "<f4").tobytes()
+    corners = np.asarray(mesh.triangles, "<u2").tobytes()
+    scene = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": list(range(len(nodes)))}],
+        "nodes": [{"mesh": 0, "translation": list(place), "scale": [size] * 3} for place, size in nodes],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "buffers": [{"byteLength": len(places) + len(corners)}],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": len(places)},
+            {"buffer": 0, "byteOffset": len(places), "byteLength": len(corners)},
+        ],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 1]},
+            {"bufferView": 1, "componentType": 5123, "count": 36, "type": "SCALAR"},
+        ],
+    }
+    text = json.dumps(scene).encode()
+    chunks = [(text.ljust(-len(text) % 4 + len(text)), b"JSON"), (places + corners, b"BIN\0")]
+    body = b"".join(struct.pack("<I", len(data)) + kind + data for data, kind in chunks)
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
+
+
+def test_a_scene_of_several_nodes(tmp_path):
+    (tmp_path / "s.glb").write_bytes(glb([((0, 0, 0), 1), ((5, 0, 0), 2), ((0, -7, 0), 0.5)]))
+    scan = read_scan(tmp_path / "s.glb")
+    assert (len(scan), len(scan.triangles)) == (24, 36)
+    np.testing.assert_allclose(scan.positions.min(axis=0), [0, -7, 0])
+    np.testing.assert_allclose(scan.positions.max(axis=0), [7, 2, 2])
+
+
+@pytest.mark.parametrize("head", ["OFF\n", "OFF\n# of quads\n\n"])
+def test_off_with_polygons(tmp_path, head):
+    faces = ["4 0 1 3 2", "4 4 6 7 5", "4 0 4 5 1", "4 2 3 7 6", "3 0 2 6", "3 0 6 4", "4 1 5 7 3 255 0 0"]
+    corners = [f"{x} {y} {z}" for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    (tmp_path / "m.off").write_text(head + "8 7 0\n" + "\n".join([*corners, *faces]) + "\n")
+    scan = read_scan(tmp_path / "m.off")
+    a, b, c = (scan.positions[corner] for corner in scan.triangles.T)
+    assert len(scan) == 8
+    np.testing.assert_allclose(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2, 6)
 
 
 # -------------------------------------------------------------------------------------------------------- what is none
