@@ -17,6 +17,7 @@ from ..io.formats import ply
 from ..io.scan import COLOR_CHANNELS, Scan
 from ..io.scans import read_blocks
 from ..numerics.frame import not_finite
+from ..numerics.vectors import finite_rows
 from .grid import Grid, tile_name, tile_of
 
 PARTS_FOLDER, PARTS_FILE = ".parts", "parts.json"
@@ -118,7 +119,7 @@ def _divided(path: Path, cut: Cut, of: list[Any], files: PartFiles) -> Split:
     points = kept = 0
     for scan in read_blocks(path, where=cut.where):
         points += len(scan)
-        scan = scan[_finite(scan)]
+        scan = scan[finite_rows(scan.positions)]
         kept += len(scan)
         rows = {tile_name(tile): chosen for tile, chosen in grid.parted(scan.positions)}
         labels.update(rows)
@@ -133,7 +134,7 @@ def _grid(path: Path, cut: Cut) -> Grid:
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     points = invalid = first = 0
     for scan in read_blocks(path, where=cut.where):
-        finite = _finite(scan)
+        finite = finite_rows(scan.positions)
         if not (invalid or finite.all()):
             first = points + int(np.argmin(finite))
         points, invalid = points + len(scan), invalid + int(len(scan) - finite.sum())
@@ -144,7 +145,3 @@ def _grid(path: Path, cut: Cut) -> Grid:
     if not (low <= high).all():
         raise InvalidCloudError("none of its points is finite")
     return Grid.over(low, high, cut.tiles, cut.overlap)
-
-
-def _finite(scan: Scan) -> np.ndarray:
-    return np.isfinite(scan.positions).all(axis=1)

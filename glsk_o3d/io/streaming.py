@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 
 from ..analysis.segmentation import vertex_of_cloud
-from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
+from ..errors import FileFormatError, InvalidCloudError
 from ..interop.atomic import check_ending, write_atomically
 from ..interop.clouds import SAMPLE_COUNT, CountedPoints, SurfaceMesh
 from ..numerics.frame import not_finite
 from ..numerics.grid_sampling import sample_blocks
+from ..numerics.vectors import finite_rows
+from ..parameters import check_number
 from ..pipeline import Pipeline
 from ..sampler import Sampler
 from ..skeleton import Skeleton
@@ -63,8 +65,7 @@ def read_sample(
     >>> len(sample.point.positions) < 60000, int(sample.point.sample_count.numpy().sum())
     (True, 120000)
     """
-    if n is not None and (isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1):
-        raise InvalidParameterError(f"n = {n!r}: must be an int of at least 1")
+    check_number("n", n, "int?", low=1)
     size = Sampler().sample_size if n is None else lambda total: int(n)
     points, counts, _ = _sampled(path, size, where, drop_invalid)
     counts = np.minimum(counts, np.iinfo(np.int32).max).astype(np.int32)
@@ -81,7 +82,7 @@ def _sampled(
         nonlocal dropped
         at = first = dropped = 0
         for block in map(Scan.by_area, read_blocks(path, where=where, bare=True)):
-            finite = np.isfinite(block.positions).all(axis=1)
+            finite = finite_rows(block.positions)
             if not (dropped or finite.all()):
                 first = at + int(np.argmin(finite))
             dropped += len(finite) - int(finite.sum())

@@ -40,37 +40,43 @@ def write_obj(skeleton: Skeleton) -> bytes:
 
 def read_obj(data: bytes) -> Skeleton:
     """The skeleton in the content of an OBJ file."""
-    vertices, paths = joined_vertices(data, "l")
+    vertices, paths, _ = joined_vertices(data, "l")
     if not (paths or data.startswith(_OBJ_MARK)):
         raise NoEdges
     return graph_skeleton([vertex[:3] for vertex in vertices], list(chain.from_iterable(map(pairwise, paths))))
 
 
 def read_mesh(path: Path) -> Scan:
-    """The vertices of an OBJ file with their colours, and its faces as triangles."""
-    vertices, faces = joined_vertices(path.read_bytes(), "f")
+    """The vertices of an OBJ file with their colours and normals, and its faces as triangles."""
+    vertices, faces, normals = joined_vertices(path.read_bytes(), "f")
     corners = Lists(np.array(list(map(len, faces))), np.array(list(chain.from_iterable(faces))))
     colored = min(map(len, vertices)) == 6
     table = np.array([vertex if colored else vertex[:3] for vertex in vertices])
-    found = triangles({"vertex_indices": corners}, len(table))
-    return Scan(table[:, :3], table[:, 3:] if colored else None, triangles=found)
+    looks = table[:, 3:] if colored else None, np.array(normals) if len(normals) == len(table) else None
+    return Scan(table[:, :3], *looks, {}, triangles({"vertex_indices": corners}, len(table)))
 
 
-def joined_vertices(data: bytes, joined: str) -> tuple[list[list[float]], list[list[int]]]:
-    """The vertices of an OBJ file, with colours if they have some, and those that each ``l`` or ``f`` line joins."""
+def joined_vertices(data: bytes, joined: str) -> tuple[list[list[float]], list[list[int]], list[list[float]]]:
+    """The vertices of an OBJ file, with colours if they have some; those that each ``l`` or ``f`` line joins; and the
+    normals, unless a corner has another one than that of its vertex's number.
+    """
     vertices: list[list[float]] = []
+    normals: list[list[float]] = []
     paths: list[list[int]] = []
+    own = True
     for keyword, *words in words_by_line(data.replace(b"\r\n", b"\n").replace(b"\\\n", b" ")):
-        if keyword == "v":
-            vertices.append([float(word) for word in words[:6]])
+        if keyword in ("v", "vn"):
+            (vertices if keyword == "v" else normals).append([float(word) for word in words[:6]])
         elif keyword == joined:
-            ends = [int(word.partition("/")[0]) for word in words]
+            corners = [word.split("/") for word in words]
+            ends = [int(corner[0]) for corner in corners]
             if 0 in ends:
                 raise ValueError("OBJ counts vertices from 1 and a line or face names vertex 0")
+            own &= all(corner[2:] in ([], corner[:1]) for corner in corners)
             paths.append([end - 1 if end > 0 else end + len(vertices) for end in ends])
     if not vertices:
         raise ValueError("it has no 'v' line")
-    return vertices, paths
+    return vertices, paths, normals if own else []
 
 
 def write_vtp(skeleton: Skeleton) -> bytes:

@@ -107,6 +107,17 @@ def test_polygons_of_many_corners(tmp_path, n):
     np.testing.assert_allclose(scan.colors[:-1], np.column_stack([angle / 7, 0 * angle + 0.5, 0 * angle + 1]))
 
 
+@pytest.mark.parametrize(("corner", "kept"), [("{0}//{0}", True), ("{0}/1/{0}", True), ("{0}//1", False)])
+def test_normals_are_kept_where_they_are_those_of_vertices(tmp_path, corner, kept):
+    normals = "".join(f"vn {x} {y} {z}\n" for x, y, z in CUBE)
+    faces = "".join("f " + " ".join(corner.format(i) for i in quad) + "\n" for quad in QUADS)
+    (tmp_path / "m.obj").write_text(POINTS + "vt 0 0\n" + normals + faces)
+    scan = read_scan(tmp_path / "m.obj")
+    assert (scan.normals is not None) == kept
+    if kept:
+        np.testing.assert_array_equal(scan.normals, CUBE)
+
+
 @pytest.mark.parametrize("face", ["f 1 2 9", "f 1 2 -9", "f 0 1 2", "f", "f 1 2 x"])
 def test_faces_that_make_no_sense(tmp_path, face):
     (tmp_path / "m.obj").write_text(f"{POINTS}{FORMS['plain']}{face}\n")
