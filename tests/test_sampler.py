@@ -209,3 +209,23 @@ def test_samples_of_a_sampled_mesh_support_its_skeleton():
     skeleton = glsk.support(PIPE, draws=2, sample=4096)
     assert skeleton.report.n_agreeing == 2
     assert len(skeleton.vertex_of_point) == len(PIPE.vertices)
+
+
+def test_what_is_measured_on_the_surface_takes_the_sample(axis, tmp_path):
+    found = glsk.analysis.assess(axis, PIPE)
+    assert min(found.centredness, found.boundedness, found.topology) > 0.95
+    grasps = glsk.analysis.grasp_candidates(axis, 4.0)
+    glsk.save_skeleton(axis, tmp_path / "s.json")
+    read = glsk.read_skeleton(tmp_path / "s.json")  # which holds the vertices alone
+    with pytest.raises(glsk.InvalidParameterError, match="give its cloud"):
+        glsk.analysis.grasp_candidates(read, 4.0)
+    assert len(glsk.analysis.grasp_candidates(read, 4.0, cloud=PIPE)) == len(grasps) > 0
+
+
+def test_a_scene_of_meshes_is_sampled_before_it_is_cut_into_tiles(tmp_path):
+    o3d.io.write_triangle_mesh(str(tmp_path / "bar.ply"), o3d.geometry.TriangleMesh.create_box(1, 1, 40))
+    result = glsk.batch.run_batch([tmp_path / "bar.ply"], tmp_path / "out", tiles=12, overlap=3, workers=1)
+    assert (result.failed, len(result.rows)) == (0, 5)  # four tiles, and the whole
+    whole = glsk.read_skeleton(tmp_path / "out" / "bar.ply")
+    assert (whole.n_components, whole.n_loops, len(whole.leaves)) == (1, 0, 2)
+    assert abs(whole.length - 40) < 1

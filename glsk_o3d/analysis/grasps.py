@@ -220,11 +220,15 @@ def _object(skeleton: Skeleton, cloud: Any) -> np.ndarray:
     """The points of the object, none if the check is left out."""
     if isinstance(cloud, tuple | list) and len(cloud) == 0:
         return np.empty((0, 3))
-    if cloud is None and len(skeleton.points) == 0:
+    whole = skeleton.whole
+    lost = (
+        skeleton.report.n_by_area > 0 and whole is skeleton
+    )  # of a mesh that was sampled files hold the vertices alone
+    if cloud is None and (lost or len(whole.points) == 0):
         raise InvalidParameterError(
             "this skeleton has no points of the object: give its cloud (--cloud), or cloud=() to check nothing"
         )
-    points = skeleton.whole.points if cloud is None else surface_points(cloud)
+    points = whole.points if cloud is None else surface_points(cloud)
     return points[np.isfinite(points).all(axis=1)]
 
 

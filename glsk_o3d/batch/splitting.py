@@ -117,7 +117,7 @@ def _divided(path: Path, cut: Cut, of: list[Any], files: PartFiles) -> Split:
     grid = _grid(path, cut)
     labels: set[str] = set()
     points = kept = 0
-    for scan in read_blocks(path, where=cut.where):
+    for scan in map(Scan.by_area, read_blocks(path, where=cut.where)):
         points += len(scan)
         scan = scan[finite_rows(scan.positions)]
         kept += len(scan)
@@ -133,7 +133,7 @@ def _grid(path: Path, cut: Cut) -> Grid:
     """The grid over the box of the points."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     points = invalid = first = 0
-    for scan in read_blocks(path, where=cut.where):
+    for scan in map(Scan.by_area, read_blocks(path, where=cut.where)):
         finite = finite_rows(scan.positions)
         if not (invalid or finite.all()):
             first = points + int(np.argmin(finite))

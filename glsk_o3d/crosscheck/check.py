@@ -8,10 +8,10 @@ import numpy as np
 from ..contractor import Contractor
 from ..driver import as_pipeline
 from ..errors import InvalidParameterError
-from ..interop.clouds import cloud_points
 from ..interop.packages import require
 from ..numerics.morton import morton_order
 from ..pipeline import Pipeline
+from ..points import surface_points
 from ..report import warn
 from ..ring_builder import RingBuilder
 from ..skeleton import Skeleton
@@ -120,7 +120,7 @@ def cross_check(cloud: Any, *, pipeline: Pipeline[Any] | str = "default") -> Cro
     if RingBuilder not in kinds or Contractor not in kinds:
         raise InvalidParameterError(f"pipeline = {pipeline!r}: must have a RingBuilder and a Contractor")
     require("igl")  # before the work that it is for
-    given = cloud_points(cloud)
+    given = surface_points(cloud)
     points = _thinned(given)
     rings = kinds.index(RingBuilder) + 1
     state: Contraction = Pipeline(*(each for each in pipeline.stages[:rings] if not isinstance(each, Thinner)))(points)
