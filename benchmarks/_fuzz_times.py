@@ -412,7 +412,7 @@ def _along_edges(n: int, rng: np.random.Generator, nodes: np.ndarray, edges: np.
     """Points on the tubes around the edges of a graph, but not those inside of another one."""
     a, b = nodes[edges[:, 0]], nodes[edges[:, 1]]
     length = np.linalg.norm(b - a, axis=1)
-    draws = round(1.5 * n)
+    draws = 3 * n
     which, turn = rng.choice(len(edges), draws, p=length / length.sum()), 2 * np.pi * rng.random((draws, 1))
     way = (b - a) / length[:, None]
     side = np.cross(way, np.where(np.abs(way[:, :1]) < 0.6, [1.0, 0, 0], [0, 1.0, 0]))
@@ -429,8 +429,7 @@ def _lattice_of(side: int) -> Draw:
 
     def draw(n: int, rng: np.random.Generator) -> np.ndarray:
         nodes = _box(side, side, side)
-        edges = np.array([(i, j) for i, j in cKDTree(nodes).query_pairs(1.01)])
-        return _along_edges(n, rng, nodes, np.sort(edges, axis=0), 0.15)
+        return _along_edges(n, rng, nodes, np.array(sorted(cKDTree(nodes).query_pairs(1.01))), 0.15)
 
     return draw
 

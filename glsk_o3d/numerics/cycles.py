@@ -4,11 +4,13 @@ from typing import TypeAlias
 
 import numpy as np
 from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import dijkstra
+from scipy.sparse.csgraph import connected_components, dijkstra
 
 from .groups import group_sum
 from .paths import maximal_paths
 from .vectors import TINY, dot
+
+ROOTS = 256  # speed: roots at a time from which cycles are closed
 
 Chain: TypeAlias = tuple[float, list[int]]
 """The length of a path and its vertices."""
@@ -93,37 +95,61 @@ def _horton(chains: list[Chain]) -> list[Chain]:
     m, keys = len(junctions), np.array(list(shortest))
     graph = csr_matrix((lengths[list(shortest.values())], keys.T), shape=(m, m))
     distance, before = dijkstra(graph, return_predecessors=True)
-    component = len({int(np.argmax(np.isfinite(row))) for row in distance})
-    rank = len(chains) - m + component
-
-    def path(root: int, v: int) -> int:
-        """Chains on the shortest path, as a bit mask."""
-        mask = 0
-        while v != root:
-            u = int(before[root, v])
-            mask |= 1 << shortest[u, v]
-            v = u
-        return mask
-
-    # Candidates: a chain, closed by the shortest paths from a root to its two ends.
-    totals = distance[:, ends[:, 0]] + distance[:, ends[:, 1]] + lengths
+    rank = len(chains) - m + connected_components(graph, directed=False)[0]
+    totals, root, closing = _closed(distance, before, ends, lengths, shortest)
     basis, pivots = list[tuple[float, list[int]]](), dict[int, int]()
-    for candidate in np.argsort(totals, axis=None, kind="stable").tolist():
-        root, e = divmod(candidate, len(chains))
-        total = float(totals[root, e])
-        if len(basis) == rank or not np.isfinite(total):
+    for total, top, e in zip(totals.tolist(), root.tolist(), closing.tolist(), strict=True):
+        if len(basis) == rank:
             break
-        one, other = (path(root, v) for v in ends[e].tolist())
-        if one & other or (one | other) >> e & 1:
-            continue  # not a simple cycle
-        cycle = one | other | 1 << e
+        cycle, above = 1 << e, before[top]
+        for v in ends[e].tolist():
+            while v != top:
+                u = int(above[v])
+                cycle |= 1 << shortest[u, v]
+                v = u
         reduced = cycle
-        while reduced and (top := reduced.bit_length()) in pivots:
-            reduced ^= pivots[top]
+        while reduced and (pivot := reduced.bit_length()) in pivots:
+            reduced ^= pivots[pivot]
         if reduced:
             pivots[reduced.bit_length()] = reduced
             basis.append((total, _walk([chains[i][1] for i in range(len(chains)) if cycle >> i & 1])))
     return basis
+
+
+def _closed(
+    distance: np.ndarray, before: np.ndarray, ends: np.ndarray, lengths: np.ndarray, shortest: dict[tuple[int, int], int]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Simple cycles of a chain and the shortest paths from a root to its two ends: lengths, roots, chains.
+
+    The shortest first, and each once: of those that are closed from several roots the first. It is known by the sum of
+    random codes of its chains, and is simple if its paths start apart.
+    """
+    m, n = len(distance), len(lengths)
+    every, (a, b), codes = np.arange(m), ends.T, np.random.default_rng(0).integers(1 << 62, size=n)
+    code, direct = np.zeros((m, m), np.int64), np.zeros(n, bool)
+    code[tuple(np.array(list(shortest)).T)] = codes[list(shortest.values())]
+    direct[list(shortest.values())] = True
+    found = [np.empty((3, 0))]
+    names = [np.empty(0, np.int64)]
+    for start in range(0, m, ROOTS):
+        root = every[start : start + ROOTS, None]
+        up = np.where(before[root[:, 0]] < 0, root, before[root[:, 0]])
+        first, name = np.where(up == root, every, up), code[up, every]
+        while (up != root).any():  # twice as far up at a time
+            name ^= np.take_along_axis(name, up, axis=1)
+            up, first = np.take_along_axis(up, up, axis=1), np.take_along_axis(first, first, axis=1)
+        onward = direct & ((before[root[:, 0]][:, b] == a) | (before[root[:, 0]][:, a] == b))
+        totals = distance[root[:, 0]][:, a] + distance[root[:, 0]][:, b] + lengths
+        row, e = np.nonzero((first[:, a] != first[:, b]) & ~onward & np.isfinite(totals))
+        name, total = name[row, a[e]] ^ name[row, b[e]] ^ codes[e], totals[row, e]
+        once = np.lexsort([total, name])
+        once = np.sort(once[np.unique(name[once], return_index=True)[1]])
+        names.append(name[once])
+        found.append(np.stack([total[once], row[once] + start, e[once]]))
+    every_name, (total, row, e) = np.concatenate(names), np.concatenate(found, axis=1)
+    order = np.argsort(total, kind="stable")
+    order = order[np.sort(np.unique(every_name[order], return_index=True)[1])]
+    return total[order], row[order].astype(int), e[order].astype(int)
 
 
 def _walk(chains: list[list[int]]) -> list[int]:

@@ -90,6 +90,14 @@ class Evidence(SurfaceGraph):
         vars(made).update(diffusion=surface.diffusion, areas=surface.areas)  # over the same links
         return made
 
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.points)
+
+    def near(self, place: np.ndarray, reach: float) -> np.ndarray:
+        """The points that are not farther from a place, ascending int array."""
+        return np.array(self._tree.query_ball_point(place, reach, return_sorted=True), int)
+
     def winding(self, queries: np.ndarray) -> np.ndarray:
         """Winding number of the surface around each place, (m,) float array from (m, 3): near 1 inside, 0 outside."""
         return winding_number(self.points, self.normals, self.areas, queries)

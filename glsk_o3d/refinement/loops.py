@@ -92,8 +92,9 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
     bonds, spacing = evidence.bonds(skeleton), max(evidence.spacing, TINY)
     loops = [skeleton.vertices[cycle] for cycle in cycles]
     views = [_View(loop, tube, evidence) for loop, tube in zip(loops, tubes, strict=True)]
-    along = np.split(evidence.winding(np.concatenate(loops)), np.cumsum([len(loop) for loop in loops[:-1]]))
-    medians = [quantile(numbers) for numbers in along]
+    vertices, which = np.unique(np.concatenate(cycles), return_inverse=True)  # loops of a lattice share most of theirs
+    along = evidence.winding(skeleton.vertices[vertices])[which]
+    medians = [quantile(each) for each in np.split(along, np.cumsum([len(loop) for loop in loops[:-1]]))]
     falls = _falls(views, np.array(medians), evidence)
     found = []
     for cycle, tube, view, inside, fall in zip(cycles, tubes, views, medians, falls, strict=True):
@@ -128,11 +129,20 @@ class _View:
         self.places, axes = places_inside(loop, LOOP_GRID)
         if not len(self.places):
             self.places = self.centre[None]
-        points = (evidence.points - self.centre) @ axes.T
-        near = np.abs(points[:, 2]) < self.radius + tube
-        self._points, self._normals = points[near, :2], evidence.normals[near] @ axes[:2].T
-        self._places = (self.places - self.centre) @ axes[:2].T
-        self.sight = cKDTree(self._points).query(self._places)[0] if near.any() else np.zeros(len(self.places))
+        self._places, self._evidence, self._axes = (self.places - self.centre) @ axes[:2].T, evidence, axes
+        extent = np.linalg.norm(loop - self.centre, axis=1).max() + tube
+        self._half = self.radius + tube  # of what stands in the way, along the normal
+        self._see(evidence.near(self.centre, float(np.hypot(2 * extent, self._half))), 2 * extent)
+        if (self.sight > self._clear).any():
+            self._see(np.arange(len(evidence.points)), np.inf)
+
+    def _see(self, rows: np.ndarray, reach: float) -> None:
+        """Take up all points so near to the centre; from each place one sees those in a circle that is `_clear`."""
+        points = (self._evidence.points[rows] - self.centre) @ self._axes.T
+        near = np.abs(points[:, 2]) < self._half
+        self._points, self._normals = points[near, :2], self._evidence.normals[rows[near]] @ self._axes[:2].T
+        self.sight = cKDTree(self._points).query(self._places)[0] if near.any() else np.full(len(self.places), 0.0 if reach == np.inf else np.inf)
+        self._clear = reach - np.hypot(*self._places.T)
 
     def walls(self, place: int) -> float:
         """How far the nearest points all around a place face it: the mean cosine, of no points 0."""
@@ -141,6 +151,9 @@ class _View:
         sector = (WALL_SECTORS * (np.arctan2(way[:, 1], way[:, 0]) / (2 * np.pi) + 0.5)).astype(int) % WALL_SECTORS
         order = np.lexsort([distance, sector])
         nearest = order[np.unique(sector[order], return_index=True)[1]]
+        if self._clear[place] < np.inf and not (len(nearest) == WALL_SECTORS and distance[nearest].max() < self._clear[place]):
+            self._see(np.arange(len(self._evidence.points)), np.inf)
+            return self.walls(place)
         cosine = np.abs((self._normals[nearest] * way[nearest]).sum(axis=1)) / np.maximum(distance[nearest], TINY)
         return float(cosine.sum() / WALL_SECTORS)
 

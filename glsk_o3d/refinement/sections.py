@@ -52,7 +52,7 @@ class VertexPoints:
         """The same, at least 1, as float array."""
         return np.maximum(self.count, 1).astype(float)
 
-    @property
+    @cached_property
     def distance(self) -> np.ndarray:
         """Median distance from every vertex to its points, (M,) float array."""
         return group_median(norm(self.offset), self.vertex, len(self.skeleton.vertices))
