@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -29,11 +29,15 @@ def _block(n: int, rng: np.random.Generator) -> np.ndarray:
     return _box(*[max(round(n ** (1 / 3)), 2)] * 3)
 
 
-def _solid(n: int, inside: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """About n whole numbers inside of something in a cube from -1 to 1."""
+def _solid(n: int, inside: Callable[[np.ndarray], np.ndarray], every: int = 1) -> np.ndarray:
+    """About n whole numbers inside of something in a cube from -1 to 1, of every so many a slice."""
     share = inside(2 * np.random.default_rng(0).random((100_000, 3)) - 1).mean()
-    places = _box(*[round((n / share) ** (1 / 3))] * 3)
-    return places[inside(2 * places / places.max() - 1)]
+    side = round((every * n / share) ** (1 / 3))
+    slices = []
+    for z in range(0, side, every):
+        places = np.column_stack([_box(side, side), np.full(side * side, float(z))])
+        slices.append(places[inside(2 * places / (side - 1) - 1)])
+    return np.concatenate(slices)
 
 
 def _of_tubes(x: np.ndarray) -> np.ndarray:
@@ -61,20 +65,20 @@ def _voxel_rod(n: int, rng: np.random.Generator) -> np.ndarray:
     return _box(side, side, 16 * side)
 
 
-def _shell(solid: np.ndarray) -> np.ndarray:
-    """Those of some whole numbers that lack one of their six neighbours."""
+def _shell(solid: np.ndarray, axes: tuple[int, ...] = (0, 1, 2)) -> np.ndarray:
+    """Those of some whole numbers that lack a neighbour along one of the axes."""
     side = int(solid.max()) + 3
     full = np.zeros((side,) * 3, bool)
     at = tuple(solid.astype(int).T + 1)
     full[at] = True
     hidden = np.ones(len(solid), bool)
-    for axis, step in ((axis, step) for axis in range(3) for step in (-1, 1)):
+    for axis, step in product(axes, (-1, 1)):
         hidden &= np.roll(full, step, axis)[at]
     return solid[~hidden]
 
 
 def _voxel_shell(n: int, rng: np.random.Generator) -> np.ndarray:
-    return _shell(_solid(round(1.3 * (n / 6) ** 1.5), _of_tubes))
+    return _shell(_solid(round((n / 6.5) ** 1.5), _of_tubes))
 
 
 def _box_shell(n: int, rng: np.random.Generator) -> np.ndarray:
@@ -83,9 +87,9 @@ def _box_shell(n: int, rng: np.random.Generator) -> np.ndarray:
 
 
 def _ct_slices(n: int, rng: np.random.Generator) -> np.ndarray:
-    """Of the shell of a solid every fifth slice."""
-    shell = _shell(_solid(round(1.3 * (n / 1.6) ** 1.5), _of_tubes))
-    return shell[shell[:, 2] % 5 == 0]
+    """The contours of a body in slices five times as far apart as the points in them."""
+    slices = _solid(round((n / 1.15) ** 1.5 / 5), _of_tubes, every=5)
+    return _shell(slices, axes=(0, 1))
 
 
 def _ct_contours(n: int, rng: np.random.Generator) -> np.ndarray:
@@ -402,10 +406,6 @@ def _balls(n: int, rng: np.random.Generator) -> np.ndarray:
     """Many spheres, each of some points."""
     m = max(n // 200, 2)
     return samples.sphere(n).points + 5 * rng.random((m, 3))[rng.integers(0, m, n)] * m ** (1 / 3)
-
-
-def _bushes(n: int, rng: np.random.Generator) -> np.ndarray:
-    return samples.tree(n, levels=4).points if "levels" in samples.tree.__code__.co_varnames else samples.tree(n).points
 
 
 def _along_edges(n: int, rng: np.random.Generator, nodes: np.ndarray, edges: np.ndarray, radius: float) -> np.ndarray:

@@ -1,6 +1,6 @@
 """Look for what breaks: degenerate clouds through all pipelines, damaged files through all readers, unsound skeletons.
 
-Findings are crashes, hangs, memory, errors that are not of the package, warnings, vertices that are no numbers or lie
+Findings are crashes, hangs, memory, clouds that take much longer than others of their size, errors that are not of the package, warnings, vertices that are no numbers or lie
 outside of the box of the points, indices out of range, and skeletons that depend on the order of the points.
 """
 
@@ -26,6 +26,8 @@ import typer
 from _fuzz_arrays import array_case
 from _fuzz_files import file_case
 from _fuzz_lies import bomb_case, lie_case, named_case
+from _fuzz_times import KINDS, MOST_RATIO, SIZES, time_case
+from _fuzz_times import LIMIT_S as TIMES_LIMIT_S
 from _runs import application, cause_of_death
 from _tables import present
 from _unsound import unsound_case
@@ -58,7 +60,8 @@ class Outcome(NamedTuple):
 def run_cases(what: str, seed: int, numbers: range) -> Iterator[Outcome]:
     """Run cases, one after another, in a process that is started anew where it ended."""
     context = get_context("spawn")
-    first, last, limit = numbers.start, numbers.stop, LIMIT_S if what == "arrays" else min(LIMIT_S, FILE_LIMIT_S)
+    limits = {"arrays": LIMIT_S, "times": TIMES_LIMIT_S}
+    first, last, limit = numbers.start, numbers.stop, limits.get(what, min(LIMIT_S, FILE_LIMIT_S))
     while first < last:
         receiver, sender = context.Pipe(duplex=False)
         process = context.Process(target=_work, args=(sender, what, seed, range(first, last)), daemon=True)
@@ -92,6 +95,9 @@ def one_case(what: str, seed: int, number: int, folder: Path) -> Outcome:
     cases = {"files": file_case, "lies": lie_case, "bombs": bomb_case, "named": named_case, "skeletons": unsound_case}
     before, start = _measured("VmRSS"), time.monotonic()
     try:
+        if what == "times":
+            kind, told, seconds = time_case(seed, number)
+            return Outcome(number, kind, told, [], seconds=seconds)
         found = array_case(rng) if what == "arrays" else cases[what](rng, folder)
     except KeyboardInterrupt:
         raise
@@ -177,6 +183,38 @@ def bombs(runs: Runs = 100, seed: Seed = 0, case: Only = None) -> None:
 def named(runs: Runs = 100, seed: Seed = 0, case: Only = None) -> None:
     """Files that name pipes, devices, folders, loops of links, and what is not there."""
     _run("named", runs, seed, case)
+
+
+@app.command()
+def times(
+    seed: Seed = 0,
+    case: Only = None,
+    sizes: Annotated[str, typer.Option(help="Sizes, with commas.")] = ",".join(map(str, SIZES)),
+) -> None:
+    """Degenerate clouds of every kind and size: none takes more than five times the median CPU time of its size."""
+    if case is not None:
+        _run("times", 1, seed, case)
+    rows, findings, taken = {kind: [kind] for kind in KINDS}, [], dict[int, float]()
+    for size in map(int, sizes.split(",")):
+        first = SIZES.index(size) * len(KINDS)
+        numbers = range(first, first + len(KINDS))
+        taken |= {each.number: each.seconds if each.kind else np.inf for each in run_cases("times", seed, numbers)}
+        limit = MOST_RATIO * np.median([taken[number] for number in numbers])
+        for number in numbers:
+            if taken[number] > limit:  # once more: something else may have been in the caches
+                again = [each.seconds for each in run_cases("times", seed, range(number, number + 1)) if each.kind]
+                taken[number] = min([taken[number], *again])
+        median = np.median([taken[number] for number in numbers])
+        for number, row in zip(numbers, rows.values(), strict=True):
+            ratio = taken[number] / median
+            row += [f"{taken[number]:.2f}", f"{ratio:.1f}"]
+            if ratio > MOST_RATIO:
+                findings.append((number, f"{row[0]} of {size} points: {ratio:.1f} times the median"))
+    header = ["kind", *(name for size in sizes.split(",") for name in (f"{size}: CPU s", "ratio"))]
+    present([(f"times, seed {seed}", header, [*rows.values()])], markdown=False)
+    for number, finding in findings:
+        typer.echo(f"benchmarks/fuzz.py times --seed {seed} --case {number}  # {finding}")
+    raise typer.Exit(bool(findings))
 
 
 @app.command()

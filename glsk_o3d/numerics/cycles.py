@@ -70,13 +70,14 @@ def edges_on_cycles(n: int, edges: np.ndarray) -> np.ndarray:
 
 def _cyclic_chains(n: int, edges: np.ndarray, lengths: np.ndarray) -> list[Chain]:
     """Paths between junctions of the cyclic part. A ring of its own starts anywhere."""
-    while True:
-        paths, degree = maximal_paths(n, edges), np.bincount(edges.ravel(), minlength=n)
-        cyclic = [(vertices, path) for vertices, path in paths if degree[[vertices[0], vertices[-1]]].min() > 1]
-        if len(cyclic) == len(paths):
-            return [(float(np.cumsum(lengths[path])[-1]), vertices) for vertices, path in paths]
-        left = np.sort(np.concatenate([np.empty(0, int), *(path for _, path in cyclic)]))
-        edges, lengths = edges[left], lengths[left]
+    paths = maximal_paths(n, edges)
+    ends, cyclic = np.array([(chain[0], chain[-1]) for chain, _ in paths], int).reshape(-1, 2), np.ones(len(paths), bool)
+    while (tips := (np.bincount(ends[cyclic].ravel(), minlength=n) == 1)[ends].any(axis=1) & cyclic).any():
+        cyclic &= ~tips
+    if not cyclic.all():
+        left = np.sort([edge for (_, path), on in zip(paths, cyclic, strict=True) if on for edge in path]).astype(int)
+        paths, lengths = maximal_paths(n, edges[left]), lengths[left]
+    return [(float(np.cumsum(lengths[path])[-1]), vertices) for vertices, path in paths]
 
 
 def _horton(chains: list[Chain]) -> list[Chain]:

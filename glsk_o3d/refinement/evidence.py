@@ -77,6 +77,7 @@ class Evidence(SurfaceGraph):
 
     normals: np.ndarray  # (n, 3) unit vectors that point outward
     _said: dict[str, tuple[Skeleton, Any]] = field(default_factory=dict, repr=False)
+    _wound: dict[bytes, float] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(cls, skeleton: Skeleton, surface: SurfaceGraph | None = None) -> Evidence:
@@ -101,6 +102,13 @@ class Evidence(SurfaceGraph):
     def winding(self, queries: np.ndarray) -> np.ndarray:
         """Winding number of the surface around each place, (m,) float array from (m, 3): near 1 inside, 0 outside."""
         return winding_number(self.points, self.normals, self.areas, queries)
+
+    def winding_at(self, vertices: np.ndarray) -> np.ndarray:
+        """The same of vertices, which stay where they are while others are merged: of each it is asked once."""
+        names = [place.tobytes() for place in vertices]
+        fresh = [row for row, name in enumerate(names) if name not in self._wound]
+        self._wound.update(zip([names[row] for row in fresh], self.winding(vertices[fresh]).tolist(), strict=True))
+        return np.array([self._wound[name] for name in names])
 
     def winding_along(self, skeleton: Skeleton) -> np.ndarray:
         """That at the middle of every edge, (E,) float array."""

@@ -93,7 +93,7 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
     loops = [skeleton.vertices[cycle] for cycle in cycles]
     views = [_View(loop, tube, evidence) for loop, tube in zip(loops, tubes, strict=True)]
     vertices, which = np.unique(np.concatenate(cycles), return_inverse=True)  # loops of a lattice share most of theirs
-    along = evidence.winding(skeleton.vertices[vertices])[which]
+    along = evidence.winding_at(skeleton.vertices[vertices])[which]
     medians = [quantile(each) for each in np.split(along, np.cumsum([len(loop) for loop in loops[:-1]]))]
     falls = _falls(views, np.array(medians), evidence)
     found = []
