@@ -1,4 +1,4 @@
-"""Clouds of every degenerate kind, of any size: each kind is a way in which other clouds could take longer than most."""
+"""Clouds of every degenerate kind, of any size: each is a way in which clouds could take longer than others."""
 
 from __future__ import annotations
 
@@ -374,7 +374,9 @@ def _rings(n: int, rng: np.random.Generator) -> np.ndarray:
     """Exact circles around each other in a plane, as of a spinning scanner."""
     each = max(round(np.sqrt(n)), 3)
     turn, row = _box(each, each).T
-    return np.column_stack([(1 + row) * np.cos(2 * np.pi * turn / each), (1 + row) * np.sin(2 * np.pi * turn / each)] + [0 * row])
+    return np.column_stack(
+        [(1 + row) * np.cos(2 * np.pi * turn / each), (1 + row) * np.sin(2 * np.pi * turn / each)] + [0 * row]
+    )
 
 
 def _wire(n: int, rng: np.random.Generator) -> np.ndarray:
@@ -486,7 +488,7 @@ def _fractal(n: int, rng: np.random.Generator) -> np.ndarray:
 def _outliers(n: int, rng: np.random.Generator) -> np.ndarray:
     """A fifth of the points anywhere."""
     points = samples.sauropod(n).points
-    points[:: 5] = points.min(axis=0) + np.ptp(points, axis=0) * rng.random((len(points[::5]), 3))
+    points[::5] = points.min(axis=0) + np.ptp(points, axis=0) * rng.random((len(points[::5]), 3))
     return points
 
 
@@ -513,7 +515,10 @@ def _plain(shape: str, noise: float = 0.0) -> Draw:
 
 
 KINDS: dict[str, Draw] = {
-    **{shape.replace("_", " "): _plain(shape) for shape in ("torus", "sauropod", "tree", "sheet", "helix", "y_junction")},
+    **{
+        shape.replace("_", " "): _plain(shape)
+        for shape in ("torus", "sauropod", "tree", "sheet", "helix", "y_junction")
+    },
     "noisy torus": _plain("torus", 0.02),
     "lattice of 4": _lattice_of(4),
     "lattice of 8": _lattice_of(8),
@@ -521,7 +526,16 @@ KINDS: dict[str, Draw] = {
         draw.__name__.strip("_").replace("_", " "): draw
         for draw in (
             *(_block, _voxel_solid, _voxel_ball, _voxel_rod, _voxel_shell, _box_shell, _ct_slices, _ct_contours),
-            *(_depth_plane, _depth_tilted, _depth_scene, _height_map, _mesh_torus, _mesh_tube, _mesh_sphere, _mesh_long),
+            *(
+                _depth_plane,
+                _depth_tilted,
+                _depth_scene,
+                _height_map,
+                _mesh_torus,
+                _mesh_tube,
+                _mesh_sphere,
+                _mesh_long,
+            ),
             *(_hexagonal, _honeycomb, _body_centred, _face_centred, _diamond, _sheared, _holey_block, _stretched),
             *(_line, _even_line, _plane, _squeezed, _planes, _crossed_planes, _parallel_lines, _star),
             *(_collinear_clusters, _clusters, _tiny_clusters, _two_scales, _dense_spot, _gradient, _cone),

@@ -1,7 +1,8 @@
 """Look for what breaks: degenerate clouds through all pipelines, damaged files through all readers, unsound skeletons.
 
-Findings are crashes, hangs, memory, clouds that take much longer than others of their size, errors that are not of the package, warnings, vertices that are no numbers or lie
-outside of the box of the points, indices out of range, and skeletons that depend on the order of the points.
+Findings are crashes, hangs, memory, clouds that take much longer than others of their size, errors that are not of the
+package, warnings, vertices that are no numbers or lie outside of the box of the points, indices out of range, and
+skeletons that depend on the order of the points.
 """
 
 from __future__ import annotations

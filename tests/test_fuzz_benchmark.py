@@ -1,6 +1,8 @@
 """The fuzzer: a few of its cases, and that it finds what is there to be found."""
 
+import numpy as np
 import pytest
+import typer
 
 from glsk_o3d import Report, Skeleton, skeletonize
 from glsk_o3d.samples import torus
@@ -54,3 +56,41 @@ def test_what_is_wrong_is_found(parts):
         spoilt.__dict__.update({**ring.__dict__, **changes})
         assert said in parts.fuzz_arrays.unsound(spoilt, ring.points, 0.05)[0]
     assert parts.fuzz_arrays.unsound(ring, ring.points, 0.05) == []
+
+
+@pytest.mark.parametrize("n", [300, 1500])
+def test_every_kind_that_is_timed_has_about_as_many_points(parts, n):
+    for kind, draw in parts.fuzz_times.KINDS.items():
+        cloud = draw(n, np.random.default_rng(0))
+        assert cloud.shape[1] == 3, kind
+        assert np.isfinite(cloud).all(), kind
+        assert 0.4 * n < len(cloud) < 2.5 * n, kind
+        np.testing.assert_array_equal(cloud, draw(n, np.random.default_rng(0)), kind)
+    assert len(parts.fuzz_times.KINDS) * len(parts.fuzz_times.SIZES) >= 300
+
+
+def test_a_cloud_that_takes_longer_than_others_is_found(tool, parts, monkeypatch, capsys):
+    """Once more, to be sure."""
+    sizes, kinds = parts.fuzz_times.SIZES, [*parts.fuzz_times.KINDS]
+    asked = []
+
+    def outcomes(what, seed, numbers):
+        asked.extend(numbers)
+        slow = {1: 6.1, len(kinds) + 2: 4.9}
+        return [tool.Outcome(number, kinds[0], "skeleton", [], seconds=slow.get(number, 1.0)) for number in numbers]
+
+    monkeypatch.setattr(tool, "run_cases", outcomes)
+    for given, slow in ((f"{sizes[0]},{sizes[1]}", True), (f"{sizes[1]}", False)):
+        with pytest.raises(typer.Exit) as stop:
+            tool.times(seed=3, case=None, sizes=given)
+        assert bool(stop.value.exit_code) is slow
+    told = capsys.readouterr().out
+    assert f"times --seed 3 --case 1  # {kinds[1]} of {sizes[0]} points: 6.1 times" in told
+    assert told.count("--case") == 1
+    assert asked.count(1) == 2
+
+
+def test_a_case_is_timed(parts):
+    kind, told, seconds = parts.fuzz_times.time_case(0, [*parts.fuzz_times.KINDS].index("even line"))
+    assert (kind, told) == (f"{parts.fuzz_times.SIZES[0]} even line", "skeleton")
+    assert seconds > 0

@@ -71,7 +71,10 @@ def edges_on_cycles(n: int, edges: np.ndarray) -> np.ndarray:
 def _cyclic_chains(n: int, edges: np.ndarray, lengths: np.ndarray) -> list[Chain]:
     """Paths between junctions of the cyclic part. A ring of its own starts anywhere."""
     paths = maximal_paths(n, edges)
-    ends, cyclic = np.array([(chain[0], chain[-1]) for chain, _ in paths], int).reshape(-1, 2), np.ones(len(paths), bool)
+    ends, cyclic = (
+        np.array([(chain[0], chain[-1]) for chain, _ in paths], int).reshape(-1, 2),
+        np.ones(len(paths), bool),
+    )
     while (tips := (np.bincount(ends[cyclic].ravel(), minlength=n) == 1)[ends].any(axis=1) & cyclic).any():
         cyclic &= ~tips
     if not cyclic.all():
@@ -118,7 +121,11 @@ def _horton(chains: list[Chain]) -> list[Chain]:
 
 
 def _closed(
-    distance: np.ndarray, before: np.ndarray, ends: np.ndarray, lengths: np.ndarray, shortest: dict[tuple[int, int], int]
+    distance: np.ndarray,
+    before: np.ndarray,
+    ends: np.ndarray,
+    lengths: np.ndarray,
+    shortest: dict[tuple[int, int], int],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Simple cycles of a chain and the shortest paths from a root to its two ends: lengths, roots, chains.
 

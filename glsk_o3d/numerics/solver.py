@@ -12,8 +12,8 @@ from .vectors import Ints, box
 SOLVE_TOLERANCE = 1e-7  # of the cloud's size; refinement ends here
 SOLVE_ACCEPTABLE = 1e-4  # of the cloud's size; a solve that stalls above this is refused
 MAX_REFINEMENTS = 6
-# speed: columns at a time: one is a fifth faster than the usual 10 at 1000 points, a twentieth at 50000; but where as
-# many of the first half of all unknowns as `WIDE_CUT` are linked with the other, as in solids, 16 are three times faster
+# speed: columns at a time: one is a fifth faster than the usual 10 at 1000 points, a twentieth at 50000; but where more
+# of the first half of all unknowns than `WIDE_CUT` are linked with the other, as in solids, 16 are three times faster
 NARROW_PANEL, WIDE_PANEL, WIDE_CUT = 1, 16, 900
 
 
@@ -51,10 +51,12 @@ class Elimination:
     def factorised(self, matrix: csc_array) -> SuperLU:
         """Factors of a system whose unknowns are in their places, if these are known."""
         kept, half = self.place is not None and matrix.nnz == self.n_entries, matrix.shape[0] // 2
-        if self.place is None:  # points are along a Morton curve, of which either half is a part of the cloud
+        if (
+            self.place is None and matrix.nnz
+        ):  # points are along a Morton curve, of which either half is a part of the cloud
             cut = np.count_nonzero(matrix.indices[matrix.indptr[1 : half + 1] - 1] >= half)
             self.panel = WIDE_PANEL if cut > WIDE_CUT else NARROW_PANEL
-        factor = factorised(matrix, kept, self.panel, Equil=False)
+        factor = factorised(matrix, kept, panel=self.panel, Equil=False)
         if not kept:
             self.place = factor.perm_c if self.place is None else factor.perm_c[self.place]
             self.n_entries = matrix.nnz

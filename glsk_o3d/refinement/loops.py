@@ -141,7 +141,11 @@ class _View:
         points = (self._evidence.points[rows] - self.centre) @ self._axes.T
         near = np.abs(points[:, 2]) < self._half
         self._points, self._normals = points[near, :2], self._evidence.normals[rows[near]] @ self._axes[:2].T
-        self.sight = cKDTree(self._points).query(self._places)[0] if near.any() else np.full(len(self.places), 0.0 if reach == np.inf else np.inf)
+        self.sight = (
+            cKDTree(self._points).query(self._places)[0]
+            if near.any()
+            else np.full(len(self.places), 0.0 if reach == np.inf else np.inf)
+        )
         self._clear = reach - np.hypot(*self._places.T)
 
     def walls(self, place: int) -> float:
@@ -151,7 +155,9 @@ class _View:
         sector = (WALL_SECTORS * (np.arctan2(way[:, 1], way[:, 0]) / (2 * np.pi) + 0.5)).astype(int) % WALL_SECTORS
         order = np.lexsort([distance, sector])
         nearest = order[np.unique(sector[order], return_index=True)[1]]
-        if self._clear[place] < np.inf and not (len(nearest) == WALL_SECTORS and distance[nearest].max() < self._clear[place]):
+        if self._clear[place] < np.inf and not (
+            len(nearest) == WALL_SECTORS and distance[nearest].max() < self._clear[place]
+        ):
             self._see(np.arange(len(self._evidence.points)), np.inf)
             return self.walls(place)
         cosine = np.abs((self._normals[nearest] * way[nearest]).sum(axis=1)) / np.maximum(distance[nearest], TINY)

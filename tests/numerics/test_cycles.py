@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from glsk_o3d.numerics import cycles as cycles_module
 from glsk_o3d.numerics.cycles import edges_on_cycles, inscribed_circle, minimum_cycle_basis, places_inside
 
 
@@ -113,3 +114,31 @@ def test_bridges_and_twigs_are_on_no_cycle():
     np.testing.assert_array_equal(edges_on_cycles(7, edges), [1, 1, 1, 0, 1, 1, 1, 0])
     assert not edges_on_cycles(3, edges[:2]).any()
     assert len(edges_on_cycles(3, edges[:0])) == 0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_candidates_are_simple_cycles_each_closed_once(seed, monkeypatch):
+    """From a few roots at a time as from all of them."""
+    rng = np.random.default_rng(seed)
+    graph = weighted(nx.random_regular_graph(3, 24, seed=seed), rng, whole=seed % 2 == 1)
+    asked = []
+    closed = cycles_module._closed
+    monkeypatch.setattr(cycles_module, "_closed", lambda *given: asked.append(given) or closed(*given))
+    _, lengths = basis_of(graph)
+    monkeypatch.setattr(cycles_module, "ROOTS", 5)
+    assert basis_of(graph)[1] == lengths
+    distance, before, ends, weights, shortest = asked[0]
+    cycles = []
+    for total, root, e in zip(*closed(*asked[0]), strict=True):
+        chains = [int(e)]
+        for v in ends[e].tolist():
+            while v != root:
+                u = int(before[root, v])
+                chains.append(shortest[u, v])
+                v = u
+        assert len(chains) == len(set(chains))
+        assert (np.bincount(ends[chains].ravel()) <= 2).all()
+        np.testing.assert_allclose(total, weights[chains].sum())
+        cycles.append(frozenset(chains))
+    assert len(cycles) == len(set(cycles)) >= len(lengths)
+    assert asked[1][0].shape == distance.shape

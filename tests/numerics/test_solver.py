@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
-from glsk_o3d import samples
+from glsk_o3d import Contractor, samples
 from glsk_o3d.numerics import solver as module
 from glsk_o3d.numerics.cotangent import cotangent_laplacian
 from glsk_o3d.numerics.solver import Elimination, SolveError, solve_contraction
@@ -103,3 +103,54 @@ def test_order_of_elimination_is_kept(monkeypatch):
     alone, _ = solve_contraction(laplacian, 3 * rows, attraction, points)
     assert ordered == [(True,), (False,)]
     np.testing.assert_allclose(x, alone, rtol=0, atol=1e-9)
+
+
+def right_angled(kind, rng):
+    """Points on a grid, whose cotangents are exactly 0 until they have moved."""
+    if kind == "mesh":
+        turn, row = np.meshgrid(np.arange(int(rng.integers(20, 40))), np.arange(40.0))
+        angle = 2 * np.pi * turn.ravel() / (turn.max() + 1)
+        return np.column_stack([np.cos(angle), np.sin(angle), row.ravel() * (angle[1] - angle[0])])
+    sides = rng.integers(9, 16, 3) + [0, 0, 30]
+    points = np.stack(np.meshgrid(*map(np.arange, sides)), -1).reshape(-1, 3)
+    return points[((points == 0) | (points == sides - 1)).any(axis=1)].astype(float)
+
+
+@pytest.mark.parametrize("kind", ["shell", "mesh"])
+@pytest.mark.parametrize("seed", range(3))
+def test_factors_of_later_systems_have_no_more_entries_than_if_they_were_the_first(kind, seed, monkeypatch):
+    """Weights of the first system are exactly 0 on a grid, and those of later ones are not."""
+    sizes, factorised = [], module.factorised
+
+    def counted(matrix, *given, **options):
+        factor = factorised(matrix, *given, **options)
+        sizes.append((matrix.nnz, factor.nnz, factorised(matrix, Equil=False).nnz))
+        return factor
+
+    monkeypatch.setattr(module, "factorised", counted)
+    state = RingBuilder()(right_angled(kind, np.random.default_rng(seed)))
+    Contractor(max_iterations=4)(state)
+    entries, kept, anew = np.array(sizes).T
+    assert entries[1:].max() > entries[0]  # or it would show nothing
+    assert (kept <= 1.1 * anew).all()
+
+
+def test_wide_panels_are_for_solids_and_give_the_same(monkeypatch):
+    panels, places, factorised = [], [], module.factorised
+
+    def noted(matrix, *given, panel, **options):
+        panels.append(panel)
+        return factorised(matrix, *given, panel=panel, **options)
+
+    monkeypatch.setattr(module, "factorised", noted)
+    rng = np.random.default_rng(2)
+    for points in (rng.random((16000, 3)), samples.torus(6000).points):
+        state = RingBuilder()(points)
+        system = cotangent_laplacian(state.positions, state.rings), np.ones(len(state)), np.ones(len(state))
+        places.append(solve_contraction(*system, state.positions)[0])
+        monkeypatch.setattr(module, "WIDE_CUT", 10**9)
+        places.append(solve_contraction(*system, state.positions)[0])
+        monkeypatch.undo()
+        monkeypatch.setattr(module, "factorised", noted)
+    assert panels == [module.WIDE_PANEL, *[module.NARROW_PANEL] * 3]
+    np.testing.assert_allclose(places[0], places[1], rtol=0, atol=1e-9)
