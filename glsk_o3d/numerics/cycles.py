@@ -4,16 +4,16 @@ from typing import TypeAlias
 
 import numpy as np
 from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.csgraph import breadth_first_order, dijkstra
 
-from .groups import group_sum
+from .groups import component_labels, group_sum
 from .paths import maximal_paths
-from .vectors import TINY, dot
-
-ROOTS = 256  # speed: roots at a time from which cycles are closed
+from .vectors import TINY, Floats, Ints, dot
 
 Chain: TypeAlias = tuple[float, list[int]]
 """The length of a path and its vertices."""
+Chains: TypeAlias = dict[tuple[int, int], int]
+"""The number of the shortest chain between two junctions, both ways."""
 
 
 def minimum_cycle_basis(n: int, edges: np.ndarray, lengths: np.ndarray) -> list[np.ndarray]:
@@ -32,49 +32,28 @@ def minimum_cycle_basis(n: int, edges: np.ndarray, lengths: np.ndarray) -> list[
 def edges_on_cycles(n: int, edges: np.ndarray) -> np.ndarray:
     """Whether each edge is on a cycle, (e,) bool array, and no bridge, in a graph as in `minimum_cycle_basis`.
 
-    An edge that is in no spanning tree closes a cycle with the ways in it from both of its ends to where they meet. Of
-    these all edges are contracted, so that none is walked twice.
+    An edge that is in no spanning tree closes a cycle with edges of one. Every one of these has the sum of the random
+    codes of those that close a cycle with it, which is 0 if there are none: what is below it in the tree adds up.
     """
-    around: list[list[tuple[int, int]]] = [[] for _ in range(n)]
-    for edge, (a, b) in enumerate(edges.tolist()):
-        around[a].append((b, edge))
-        around[b].append((a, edge))
-    depth, above, closing = [-1] * n, [(-1, -1)] * n, []
-    for root in range(n):
-        if depth[root] >= 0:
-            continue
-        depth[root], front = 0, [root]
-        for here in front:
-            for there, edge in around[here]:
-                if depth[there] < 0:
-                    depth[there], above[there] = depth[here] + 1, (here, edge)
-                    front.append(there)
-                elif edge != above[here][1]:
-                    closing.append((here, there, edge))
-    on, merged = np.zeros(len(edges), bool), list(range(n))
-
-    def top(v: int) -> int:
-        while merged[v] != v:
-            merged[v] = v = merged[merged[v]]
-        return v
-
-    for a, b, edge in closing:
-        on[edge] = True
-        while (a := top(a)) != (b := top(b)):
-            if depth[a] < depth[b]:
-                a, b = b, a
-            merged[a], edge = above[a]
-            on[edge] = True
-    return on
+    label = component_labels(n, edges)
+    roots = np.column_stack([np.full(label.max(initial=-1) + 1, n), np.unique(label, return_index=True)[1]])
+    links = np.concatenate([edges, roots])  # from one more vertex there is one tree
+    graph = csr_matrix((np.ones(len(links)), links.T), shape=(n + 1, n + 1))
+    order, above = breadth_first_order(graph, n, directed=False)
+    up, down = (above[edges] == edges[:, ::-1]).T
+    codes = np.where(up | down, 0, np.random.default_rng(0).integers(1 << 62, size=len(edges)))
+    total = np.zeros(n + 1, np.int64)
+    np.bitwise_xor.at(total, edges.ravel(), np.repeat(codes, 2))
+    for v in order[:0:-1].tolist():
+        total[above[v]] ^= total[v]
+    return ~(up | down) | (total[np.where(up, *edges.T)] != 0)
 
 
 def _cyclic_chains(n: int, edges: np.ndarray, lengths: np.ndarray) -> list[Chain]:
     """Paths between junctions of the cyclic part. A ring of its own starts anywhere."""
     paths = maximal_paths(n, edges)
-    ends, cyclic = (
-        np.array([(chain[0], chain[-1]) for chain, _ in paths], int).reshape(-1, 2),
-        np.ones(len(paths), bool),
-    )
+    ends = np.array([(chain[0], chain[-1]) for chain, _ in paths], int).reshape(-1, 2)
+    cyclic = np.ones(len(paths), bool)
     while (tips := (np.bincount(ends[cyclic].ravel(), minlength=n) == 1)[ends].any(axis=1) & cyclic).any():
         cyclic &= ~tips
     if not cyclic.all():
@@ -92,14 +71,14 @@ def _horton(chains: list[Chain]) -> list[Chain]:
     ends = np.array([(index[chain[0]], index[chain[-1]]) for _, chain in chains])
     lengths = np.array([length for length, _ in chains])
     order = np.argsort(lengths, kind="stable")
-    shortest = {}
+    shortest: Chains = {}
     for e in order[::-1].tolist():  # of parallel chains the shortest stays
         a, b = ends[e].tolist()
         shortest[a, b] = shortest[b, a] = e
     m, keys = len(junctions), np.array(list(shortest))
     graph = csr_matrix((lengths[list(shortest.values())], keys.T), shape=(m, m))
     distance, before = dijkstra(graph, return_predecessors=True)
-    rank = len(chains) - m + connected_components(graph, directed=False)[0]
+    rank = len(chains) - m + component_labels(m, ends).max() + 1
     totals, root, closing = _closed(distance, before, ends, lengths, shortest)
     basis, pivots = list[tuple[float, list[int]]](), dict[int, int]()
     for total, top, e in zip(totals.tolist(), root.tolist(), closing.tolist(), strict=True):
@@ -120,44 +99,27 @@ def _horton(chains: list[Chain]) -> list[Chain]:
     return basis
 
 
-def _closed(
-    distance: np.ndarray,
-    before: np.ndarray,
-    ends: np.ndarray,
-    lengths: np.ndarray,
-    shortest: dict[tuple[int, int], int],
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _closed(distance: Floats, before: Ints, ends: Ints, lengths: Floats, shortest: Chains) -> tuple[Floats, Ints, Ints]:
     """Simple cycles of a chain and the shortest paths from a root to its two ends: lengths, roots, chains.
 
     The shortest first, and each once: of those that are closed from several roots the first. It is known by the sum of
     random codes of its chains, and is simple if its paths start apart.
     """
-    m, n = len(distance), len(lengths)
-    every, (a, b), codes = np.arange(m), ends.T, np.random.default_rng(0).integers(1 << 62, size=n)
-    code, direct = np.zeros((m, m), np.int64), np.zeros(n, bool)
-    code[tuple(np.array(list(shortest)).T)] = codes[list(shortest.values())]
-    direct[list(shortest.values())] = True
-    found = [np.empty((3, 0))]
-    names = [np.empty(0, np.int64)]
-    for start in range(0, m, ROOTS):
-        root = every[start : start + ROOTS, None]
-        up = np.where(before[root[:, 0]] < 0, root, before[root[:, 0]])
-        first, name = np.where(up == root, every, up), code[up, every]
-        while (up != root).any():  # twice as far up at a time
-            name ^= np.take_along_axis(name, up, axis=1)
-            up, first = np.take_along_axis(up, up, axis=1), np.take_along_axis(first, first, axis=1)
-        onward = direct & ((before[root[:, 0]][:, b] == a) | (before[root[:, 0]][:, a] == b))
-        totals = distance[root[:, 0]][:, a] + distance[root[:, 0]][:, b] + lengths
-        row, e = np.nonzero((first[:, a] != first[:, b]) & ~onward & np.isfinite(totals))
-        name, total = name[row, a[e]] ^ name[row, b[e]] ^ codes[e], totals[row, e]
-        once = np.lexsort([total, name])
-        once = np.sort(once[np.unique(name[once], return_index=True)[1]])
-        names.append(name[once])
-        found.append(np.stack([total[once], row[once] + start, e[once]]))
-    every_name, (total, row, e) = np.concatenate(names), np.concatenate(found, axis=1)
-    order = np.argsort(total, kind="stable")
-    order = order[np.sort(np.unique(every_name[order], return_index=True)[1])]
-    return total[order], row[order].astype(int), e[order].astype(int)
+    (a, b), root, chosen = ends.T, np.arange(len(distance))[:, None], list(shortest.values())
+    codes, code = np.random.default_rng(0).integers(1 << 62, size=len(lengths)), np.zeros(distance.shape, np.int64)
+    code[tuple(np.array(list(shortest)).T)] = codes[chosen]
+    up = np.where(before < 0, root, before)
+    apart = ~(np.isin(np.arange(len(lengths)), chosen) & ((up[:, b] == a) | (up[:, a] == b)))
+    first, name = np.where(up == root, root.T, up), code[up, root.T]
+    while (up != root).any():  # twice as far up at a time
+        name ^= np.take_along_axis(name, up, axis=1)
+        up, first = (np.take_along_axis(each, each, axis=1) for each in (up, first))
+    totals = distance[:, a] + distance[:, b] + lengths
+    order = np.flatnonzero(apart & (first[:, a] != first[:, b]) & np.isfinite(totals))
+    order = order[np.argsort(totals.ravel()[order], kind="stable")]
+    names = (name[:, a] ^ name[:, b] ^ codes).ravel()[order]
+    order = order[np.sort(np.unique(names, return_index=True)[1])]
+    return totals.ravel()[order], *np.divmod(order, len(lengths))
 
 
 def _walk(chains: list[list[int]]) -> list[int]:

@@ -51,9 +51,7 @@ class Elimination:
     def factorised(self, matrix: csc_array) -> SuperLU:
         """Factors of a system whose unknowns are in their places, if these are known."""
         kept, half = self.place is not None and matrix.nnz == self.n_entries, matrix.shape[0] // 2
-        if (
-            self.place is None and matrix.nnz
-        ):  # points are along a Morton curve, of which either half is a part of the cloud
+        if self.place is None and matrix.nnz:  # along a Morton curve either half of the points is a part of the cloud
             cut = np.count_nonzero(matrix.indices[matrix.indptr[1 : half + 1] - 1] >= half)
             self.panel = WIDE_PANEL if cut > WIDE_CUT else NARROW_PANEL
         factor = factorised(matrix, kept, panel=self.panel, Equil=False)

@@ -132,20 +132,19 @@ class _View:
         self._places, self._evidence, self._axes = (self.places - self.centre) @ axes[:2].T, evidence, axes
         extent = np.linalg.norm(loop - self.centre, axis=1).max() + tube
         self._half = self.radius + tube  # of what stands in the way, along the normal
-        self._see(evidence.near(self.centre, float(np.hypot(2 * extent, self._half))), 2 * extent)
+        self._see(2 * extent)
         if (self.sight > self._clear).any():
-            self._see(np.arange(len(evidence.points)), np.inf)
+            self._see(np.inf)
 
-    def _see(self, rows: np.ndarray, reach: float) -> None:
-        """Take up all points so near to the centre; from each place one sees those in a circle that is `_clear`."""
+    def _see(self, reach: float) -> None:
+        """Take up the points so near to the centre in the plane: from each place all in a circle, which is `_clear`."""
+        rows = self._evidence.near(self.centre, float(np.hypot(reach, self._half)))
         points = (self._evidence.points[rows] - self.centre) @ self._axes.T
         near = np.abs(points[:, 2]) < self._half
         self._points, self._normals = points[near, :2], self._evidence.normals[rows[near]] @ self._axes[:2].T
-        self.sight = (
-            cKDTree(self._points).query(self._places)[0]
-            if near.any()
-            else np.full(len(self.places), 0.0 if reach == np.inf else np.inf)
-        )
+        self.sight = np.full(len(self.places), np.inf if reach < np.inf else 0.0)
+        if near.any():
+            self.sight = cKDTree(self._points).query(self._places)[0]
         self._clear = reach - np.hypot(*self._places.T)
 
     def walls(self, place: int) -> float:
@@ -155,10 +154,9 @@ class _View:
         sector = (WALL_SECTORS * (np.arctan2(way[:, 1], way[:, 0]) / (2 * np.pi) + 0.5)).astype(int) % WALL_SECTORS
         order = np.lexsort([distance, sector])
         nearest = order[np.unique(sector[order], return_index=True)[1]]
-        if self._clear[place] < np.inf and not (
-            len(nearest) == WALL_SECTORS and distance[nearest].max() < self._clear[place]
-        ):
-            self._see(np.arange(len(self._evidence.points)), np.inf)
+        clear = self._clear[place]
+        if clear < np.inf and (len(nearest) < WALL_SECTORS or distance[nearest].max() >= clear):
+            self._see(np.inf)
             return self.walls(place)
         cosine = np.abs((self._normals[nearest] * way[nearest]).sum(axis=1)) / np.maximum(distance[nearest], TINY)
         return float(cosine.sum() / WALL_SECTORS)

@@ -118,16 +118,13 @@ def test_bridges_and_twigs_are_on_no_cycle():
 
 @pytest.mark.parametrize("seed", range(5))
 def test_candidates_are_simple_cycles_each_closed_once(seed, monkeypatch):
-    """From a few roots at a time as from all of them."""
     rng = np.random.default_rng(seed)
     graph = weighted(nx.random_regular_graph(3, 24, seed=seed), rng, whole=seed % 2 == 1)
     asked = []
     closed = cycles_module._closed
     monkeypatch.setattr(cycles_module, "_closed", lambda *given: asked.append(given) or closed(*given))
     _, lengths = basis_of(graph)
-    monkeypatch.setattr(cycles_module, "ROOTS", 5)
-    assert basis_of(graph)[1] == lengths
-    distance, before, ends, weights, shortest = asked[0]
+    _, before, ends, weights, shortest = asked[0]
     cycles = []
     for total, root, e in zip(*closed(*asked[0]), strict=True):
         chains = [int(e)]
@@ -141,4 +138,3 @@ def test_candidates_are_simple_cycles_each_closed_once(seed, monkeypatch):
         np.testing.assert_allclose(total, weights[chains].sum())
         cycles.append(frozenset(chains))
     assert len(cycles) == len(set(cycles)) >= len(lengths)
-    assert asked[1][0].shape == distance.shape
