@@ -19,7 +19,7 @@ from ..numerics.vectors import dot, norm, unit
 from ..skeleton import NOT_MEASURED, Skeleton
 from .merging import merge_into
 from .rooted import numbered_from, root_among
-from .thin_parts import SpacedPoints, mostly_on_loops, without_surface
+from .thin_parts import SAME_PLACE, SpacedPoints, mostly_on_loops, without_surface
 
 # All fitted, on trees whose twigs are thinner than their points are far apart; s is the median scale of the points.
 SLICE_WIDTH = 0.5  # of geodesic distance, over s
@@ -58,6 +58,9 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
         traced, stays = drop_spurious(traced, paths.nodes < mixed.n, COVER_RADII, kept)
     else:
         stays = np.arange(len(paths.nodes))
+    point = paths.nodes[stays] < mixed.n
+    if point.any() and len(traced.edges):
+        traced = replace(traced, radii=np.where(point, thickness_around(traced), traced.radii))
     loose = thin[skeleton.vertex_of_point] & (skeleton.vertex_of_point >= 0)
     report = replace(
         skeleton.report,
@@ -209,18 +212,31 @@ def _meetings(vertices: np.ndarray, edges: np.ndarray, tips: np.ndarray, scale: 
     return tips[found].reshape(-1, 2)
 
 
-def spread_around(skeleton: Skeleton) -> np.ndarray:
+def thickness_around(skeleton: Skeleton) -> np.ndarray:
+    """That of points which are not the curve itself; a vertex without any has the one of the nearest with some."""
+    least = SAME_PLACE * np.ptp(skeleton.vertices, axis=0).max()
+    thickness = spread_around(skeleton, least)
+    known = np.flatnonzero(thickness > least)
+    if not len(known):  # a line
+        return thickness
+    links = linked(skeleton.vertices, skeleton.edges)
+    nearest = dijkstra(links, indices=known, return_predecessors=True, min_only=True)[2]
+    return np.where(nearest < 0, thickness, thickness[nearest])
+
+
+def spread_around(skeleton: Skeleton, least: float = -1) -> np.ndarray:
     """Median distance from the curve to the points around every vertex and its neighbours, (M,) float array.
 
-    Of points on a tube its radius, and outliers have little say.
+    Of points on a tube its radius, and outliers have little say. Points no farther than `least` do not count.
     """
     m, edges = len(skeleton.vertices), skeleton.edges
     some = np.flatnonzero(skeleton.vertex_of_point >= 0)
     vertex, points = skeleton.vertex_of_point[some], skeleton.points[some]
     edge, t = nearest_on_edges(skeleton.vertices, edges, incident_edges(edges, m)[vertex], points)
     away = norm(points - places_on_edges(skeleton.vertices, edges, edge, t))
-    around = steps(linked(skeleton.vertices, edges))[vertex]
-    return group_median(np.repeat(away, np.diff(around.indptr)), around.indices, m)
+    off = away > least
+    around = steps(linked(skeleton.vertices, edges))[vertex[off]]
+    return group_median(np.repeat(away[off], np.diff(around.indptr)), around.indices, m)
 
 
 def drop_spurious(
