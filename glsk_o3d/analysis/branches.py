@@ -8,15 +8,15 @@ import numpy as np
 
 from ..errors import InvalidParameterError
 from ..numerics.cycles import minimum_cycle_basis
-from ..numerics.polylines import arc_lengths, place_at
+from ..numerics.polylines import arc_lengths, place_at, relative_distance
 from ..numerics.vectors import Floats, Ints, norm
 from ..refinement.rooted import root_among
 from ..skeleton import Skeleton
 from .rows import Rows
 from .segmentation import branch_of_point
 
-# fitted: radii from a junction between which a branch has its direction; nearer, parts blend
-HEADING_SPAN = (1.0, 3.0)
+HEADING_LENGTH = 4.0  # fitted: radii of a junction over which a branch has its direction; where nearer, parts blend
+HEADING_PLACES = 65  # precision: along the half of a branch, at which it is seen where it has left the others
 FAIR_SHARE = 0.3  # fitted: of the greatest growth length at a junction; on conifers, and plants with long leaves
 PRINTED_COLUMNS = (
     *("branch", "kind", "parent", "level", "axis", "order", "length", "mean_radius", "start_radius", "end_radius"),
@@ -153,7 +153,8 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
     start, end = (np.array([path[i] for path in outward]) for i in (0, -1))
     first, last = skeleton.vertices[start], skeleton.vertices[end]
     label = branch_of_point(skeleton, skeleton.points, skeleton.vertex_of_point)
-    angle = np.array([_angle(skeleton, outward, i, parent[i]) for i in range(len(paths))])
+    at = _paths_at(paths)
+    angle = np.array([_angle(skeleton, outward, at, i, parent[i]) for i in range(len(paths))])
     mean_radius = mean(skeleton.radii)
     axis, order = _axes(parent, level, start, angle, mean_radius, length)
     return BranchTable(
@@ -179,6 +180,15 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
     )
 
 
+def _paths_at(paths: list[np.ndarray]) -> dict[int, list[int]]:
+    """The rows of the paths that end at a vertex."""
+    at: dict[int, list[int]] = {}
+    for row, path in enumerate(paths):
+        for vertex in {int(path[0]), int(path[-1])}:
+            at.setdefault(vertex, []).append(row)
+    return at
+
+
 def _grow(
     skeleton: Skeleton, paths: list[np.ndarray], length: np.ndarray, volume: np.ndarray, chosen: int | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -187,11 +197,7 @@ def _grow(
     Paths are reached from the roots, the nearest first. `chosen` is the root vertex of its component, or None; other
     components grow from the path with the most `volume`.
     """
-    ends = [(int(path[0]), int(path[-1])) for path in paths]
-    at: dict[int, list[int]] = {}
-    for row, pair in enumerate(ends):
-        for vertex in set(pair):
-            at.setdefault(vertex, []).append(row)
+    ends, at = [(int(path[0]), int(path[-1])) for path in paths], _paths_at(paths)
     parent, level, backwards = np.full(len(paths), -1), np.full(len(paths), -1), np.zeros(len(paths), bool)
     component = skeleton.component_of_vertex[[pair[0] for pair in ends]]
     queue: list[tuple[float, int, int]] = []  # distance, vertex, and the path that leads there
@@ -282,22 +288,32 @@ def _kinds(skeleton: Skeleton, paths: list[np.ndarray]) -> np.ndarray:
     return np.array([kind(path) for path in paths])
 
 
-def _angle(skeleton: Skeleton, paths: list[np.ndarray], row: int, parent: int) -> Any:
+def _angle(skeleton: Skeleton, paths: list[np.ndarray], at: dict[int, list[int]], row: int, parent: int) -> Any:
     """Degrees by which a path turns away from its parent, NaN where there is none or one of them is closed."""
     path, before = paths[row], paths[parent]
     if parent < 0 or path[0] == path[-1] or before[0] == before[-1]:
         return np.nan
-    radius = skeleton.radii[path[0]]
-    leaves = _heading(skeleton.vertices[path], radius)
-    arrives = -_heading(skeleton.vertices[before[::-1] if before[-1] == path[0] else before], radius)
+    limbs = {k: paths[k] if paths[k][0] == path[0] else paths[k][::-1] for k in at[int(path[0])]}
+    leaves, arrives = (
+        sign * _heading(skeleton, limbs[k], [limb for other, limb in limbs.items() if other != k])
+        for k, sign in ((row, 1), (parent, -1))
+    )
     if not (leaves.any() and arrives.any()):
         return np.nan
     return np.degrees(np.arctan2(np.linalg.norm(np.cross(leaves, arrives)), leaves @ arrives))
 
 
-def _heading(curve: np.ndarray, radius: float) -> np.ndarray:
-    """Where a curve goes from its first point: from one to three radii, or over the first quarter."""
+def _heading(skeleton: Skeleton, path: np.ndarray, others: list[np.ndarray]) -> np.ndarray:
+    """Where a limb goes from its junction, over four radii of that from where its section has left the other limbs.
+
+    Of a short one that is its half, and without radii over the first quarter.
+    """
+    curve, radius = skeleton.vertices[path], skeleton.radii[path[0]]
     along = arc_lengths(curve)
-    reach = along[-1]
-    near, far = np.minimum(np.multiply(HEADING_SPAN, radius), [reach / 2, reach]) if radius > 0 else (0, reach / 4)
-    return place_at(curve, along, far) - place_at(curve, along, near)
+    if not radius > 0:
+        return place_at(curve, along, along[-1] / 4) - curve[0]
+    at = along[-1] / 2 * np.linspace(0, 1, HEADING_PLACES)
+    ratio, surface = relative_distance(place_at(curve, along, at), skeleton.vertices, skeleton.radii, others)
+    outside = (ratio - 1) * surface > np.interp(at, along, skeleton.radii[path])
+    near = at[outside.argmax()] if outside.any() else at[-1]
+    return place_at(curve, along, near + HEADING_LENGTH * radius) - place_at(curve, along, near)

@@ -8,12 +8,12 @@ import numpy as np
 
 from ..errors import InvalidParameterError, SkeletonWarning
 from ..numerics.neighbourhoods import plane_axes
-from ..numerics.vectors import AXES, TINY, along_axis, norm
+from ..numerics.vectors import TINY, along_axis, norm
 from ..numerics.vectors import unit as directions
 from ..parameters import check_number
 from ..skeleton import Skeleton
 from .circles import CircleFit, fit_circle
-from .trees import OUTSIDE, Cylinders, cylinders
+from .trees import Cylinders, cylinders, lowest_around, points_near, upward
 
 BREAST_HEIGHT = 1.3  # published: metres above the ground at which foresters measure stems
 TALLEST_TREE = 116.07  # published: metres, Hyperion, the tallest tree known, as measured in 2019
@@ -101,23 +101,20 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
     >>> abs(tree_measures(stem).stem_diameter - 0.2) < 0.01  # up is x, as in the pipeline
     True
     """
-    steps = skeleton.report.recipe.get("pipeline", ())
-    grown = [root, *(step.get("root") for step in reversed(steps) if isinstance(step, dict)), "z"]
-    up = next(axis for axis in grown if isinstance(axis, str) and axis in AXES) if up is None else up
-    if up not in AXES:
-        raise InvalidParameterError(f"up = {up!r}: must be 'x', 'y' or 'z', with a minus where that points down")
+    up = upward(skeleton, root, up)
     check_number("unit", unit, low=0, open_low=True)
-    pieces = cylinders(skeleton, root)
-    ground = pieces.start_point[0]
+    pieces = cylinders(skeleton, root, up)
+    foot, onward = pieces.start_point[0], pieces.end_point[0]
+    ground = lowest_around(skeleton, foot, onward, float(pieces.radius[0]), up)
 
     def height(places: np.ndarray) -> np.ndarray:
-        return unit * along_axis(places - ground, up)
+        return unit * (along_axis(places, up) - ground)
 
     stem = pieces.order == 0
     bottom, top = height(pieces.start_point), height(pieces.end_point)
     low, high = min(bottom.min(), top.min()), max(bottom.max(), top.max())
-    near = _points_near(skeleton)
-    highest = float(max(high, height(skeleton.points[near]).max(initial=high)))
+    near = points_near(skeleton)
+    highest = float(height(skeleton.points[near]).max() if len(near) else high)
     leaving = bottom[(pieces.order == 1) & stem[pieces.parent]]
     traced = pieces.confidence == 0  # unknown is not
     length, volume = unit * pieces.length, unit**3 * np.where(traced, 0, pieces.volume)
@@ -134,7 +131,7 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
         length=tuple(np.bincount(pieces.order, length).tolist()),
         volume=tuple(np.bincount(pieces.order, volume).tolist()),
         traced=known * float(pieces.length[traced].sum() / max(pieces.length.sum(), TINY)),
-        root=tuple(ground.tolist()),
+        root=tuple(foot.tolist()),
         up=up,
         unit=unit,
         doubts=doubts,
@@ -194,13 +191,3 @@ def _find_doubts(
             f"{up} not point up?"
         )
     return tuple(doubts)
-
-
-def _points_near(skeleton: Skeleton) -> np.ndarray:
-    """Rows of the points no farther from their vertex than three radii and the longest edge there."""
-    owner, longest = skeleton.vertex_of_point, np.zeros(len(skeleton.vertices))
-    for ends in skeleton.edges.T:
-        np.maximum.at(longest, ends, skeleton.edge_lengths)
-    some = np.flatnonzero(owner >= 0)
-    away = norm(skeleton.points[some] - skeleton.vertices[owner[some]])
-    return some[away <= (OUTSIDE * skeleton.radii + longest)[owner[some]]]

@@ -9,7 +9,7 @@ from ..errors import InvalidParameterError
 from ..numerics.groups import Members
 from ..numerics.neighbourhoods import plane_axes
 from ..numerics.polylines import arc_lengths, place_at, relative_distance
-from ..numerics.vectors import TINY, Floats, norm
+from ..numerics.vectors import AXES, TINY, Floats, along_axis, norm
 from ..numerics.vectors import unit as directions
 from .branches import branch_table
 from .rows import Rows
@@ -59,12 +59,12 @@ class Cylinders(Rows, row="cylinder"):
         return super()._columns() | {"volume": self.volume.tolist()}
 
 
-def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
+def cylinders(skeleton: Any, root: Any = None, up: str | None = None) -> Cylinders:
     """Cylinders along the branches of a skeleton, each about four radii long.
 
     A branch begins where it has left its parent, on average over its section, so that nothing counts twice; the one
-    that continues the axis begins at the junction. Free ends, except the root, reach as far as their points less a
-    third of the radius, which accounts for the volume of a round cap.
+    that continues the axis begins at the junction. Free ends reach as far as their points, or a third of the radius
+    less where they are round, which accounts for the volume. The stem begins no lower than its points.
 
     Parameters
     ----------
@@ -72,6 +72,8 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
     root : str, int or (x, y, z), optional
         See `branch_table`. By default `report.root` of the pipeline `tree`; without it vertex 0 if vertices are
         numbered outwards from it; else the branch with the most volume.
+    up : {"x", "y", "z", "-x", "-y", "-z"}, optional
+        Axis that points up. By default that of `root` here or in the pipeline `tree`, or else ``"z"``.
 
     Returns
     -------
@@ -80,7 +82,8 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
     Raises
     ------
     InvalidParameterError
-        The skeleton is empty, in parts, or has loops, no branches or no radii; or there is no such root.
+        The skeleton is empty, in parts, or has loops, no branches or no radii; or there is no such root, or
+        `up` is no axis.
 
     Examples
     --------
@@ -104,6 +107,7 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
         raise InvalidParameterError("the skeleton has no radii: a file of a format without them was read")
     if root is None and not skeleton.report.root:  # numbered outwards, all but the first have one neighbour before them
         root = 0 if np.array_equal(np.sort(skeleton.edges[:, 1]), np.arange(1, len(skeleton.vertices))) else None
+    up = upward(skeleton, root, up)
     table, beyond = branch_table(skeleton, root), _beyond_tips(skeleton)
     last = np.full(len(table), -1)
     rows: list[tuple[Any, ...]] = []
@@ -114,21 +118,25 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
         last[row] = last[before] if before >= 0 else -1
         along = arc_lengths(skeleton.vertices[path])
         leaves_parent = before >= 0 and table.order[row] > table.order[before]
-        # a stem is cut off flat, other ends are round: such a cap has the volume of a cylinder two thirds shorter
         if leaves_parent:  # of what several branches share at a junction, each part is the first one's
             beside = (table.start == path[0]) & ((table.order == table.order[before]) | (np.arange(len(table)) < row))
             others = [before, *np.flatnonzero(beside & (table.parent == before)).tolist()]
             start = _length_inside(skeleton, path, along, [skeleton.branches[other] for other in others])
         else:
-            start = -beyond.get(int(path[0]), 0.0)
-        stop = along[-1] + max(beyond.get(int(path[-1]), 0.0) - skeleton.radii[path[-2]] / 3, 0.0)
+            start = -_as_cylinder(beyond.get(int(path[0]), 0.0), skeleton.radii[path[1]])
+            if before < 0:
+                start = _begun(skeleton, path, along, start, up)
+        stop = along[-1] + _as_cylinder(beyond.get(int(path[-1]), 0.0), skeleton.radii[path[-2]])
         if stop <= start:
             continue
         pieces = max(round((stop - start) / (PIECE_LENGTH * max(table.mean_radius[row], 1e-3 * (stop - start)))), 1)
+        if table.confidence[row] == 0:  # of a traced one nobody knows more than its vertices
+            pieces = min(pieces, len(path) - 1)
         ends = np.linspace(start, stop, pieces + 1)
         places = _place_beyond(skeleton.vertices[path], along, ends)
         inside = ends[:-1, None] + np.diff(ends)[:, None] * (np.arange(RADIUS_SAMPLES) + 0.5) / RADIUS_SAMPLES
-        radius = np.sqrt((np.interp(inside, along, skeleton.radii[path]) ** 2).mean(axis=1))
+        closed = [skeleton.radii[path[k]] if int(path[end]) in beyond else 0.0 for k, end in ((1, 0), (-2, -1))]
+        radius = np.sqrt((_radius_at(inside, along, skeleton.radii[path], *closed) ** 2).mean(axis=1))
         confidence = np.interp(inside, along, skeleton.confidence[path]).mean(axis=1)
         for i in range(pieces):
             size = (radius[i], ends[i + 1] - ends[i])
@@ -137,6 +145,65 @@ def cylinders(skeleton: Any, root: Any = None) -> Cylinders:
     if not rows:
         raise InvalidParameterError("the skeleton has no branches of any length: there is nothing to put cylinders on")
     return Cylinders(*(np.array(column) for column in zip(*rows, strict=True)))
+
+
+def upward(skeleton: Any, root: Any, up: str | None) -> str:
+    """The axis that points up: as given, or that of the root, here or in the pipeline, or z."""
+    steps = skeleton.report.recipe.get("pipeline", ())
+    grown = [root, *(step.get("root") for step in reversed(steps) if isinstance(step, dict)), "z"]
+    up = next(axis for axis in grown if isinstance(axis, str) and axis in AXES) if up is None else up
+    if up not in AXES:
+        raise InvalidParameterError(f"up = {up!r}: must be 'x', 'y' or 'z', with a minus where that points down")
+    return up
+
+
+def points_near(skeleton: Any) -> np.ndarray:
+    """Rows of the points no farther from their vertex than three radii and the longest edge there."""
+    owner, longest = skeleton.vertex_of_point, np.zeros(len(skeleton.vertices))
+    for ends in skeleton.edges.T:
+        np.maximum.at(longest, ends, skeleton.edge_lengths)
+    some = np.flatnonzero(owner >= 0)
+    away = norm(skeleton.points[some] - skeleton.vertices[owner[some]])
+    return some[away <= (OUTSIDE * skeleton.radii + longest)[owner[some]]]
+
+
+def lowest_around(skeleton: Any, foot: np.ndarray, onward: np.ndarray, radius: float, up: str) -> float:
+    """How high the lowest point is within three radii of the foot of a stem; as the foot, if it does not rise onward."""
+    height, ahead = along_axis(np.array([foot, onward]), up)
+    points = skeleton.points[points_near(skeleton)]
+    points = points[norm(points - foot) <= OUTSIDE * radius]
+    return float(along_axis(points, up).min(initial=np.inf if len(points) else height) if ahead > height else height)
+
+
+def _begun(skeleton: Any, path: np.ndarray, along: np.ndarray, start: float, up: str) -> float:
+    """The first length along a stem, from a start on, at which it is as high as the lowest point there."""
+    curve, lengths = skeleton.vertices[path], np.append(start, along[along > start])
+    lowest = lowest_around(skeleton, curve[0], curve[-1], skeleton.radii[path[0]], up)
+    height = along_axis(_place_beyond(curve, along, lengths), up)
+    k = int(np.argmax(height >= lowest))
+    return float(np.interp(lowest, height[k - 1 : k + 1], lengths[k - 1 : k + 1])) if k else start
+
+
+def _as_cylinder(beyond: float, radius: float) -> float:
+    """How far a cylinder goes on with the volume of an end so far `beyond` the tip: half a radius flat, and one round.
+
+    A round cap has the volume of a cylinder two thirds as high.
+    """
+    return beyond - 2 / 3 * min(max(beyond - radius / 2, 0), radius / 2)
+
+
+def _radius_at(lengths: np.ndarray, along: np.ndarray, radii: np.ndarray, first: float, last: float) -> np.ndarray:
+    """Radii at some lengths along a branch; so near its ends as the taper behind says: a face at an end has a say in them.
+
+    The taper is that of four times as much.
+    """
+    low, high = min(first, along[-1] / 4), along[-1] - min(last, along[-1] / 4)
+    radius = np.interp(np.clip(lengths, low, high), along, radii)
+    for end, way, away in ((low, 1, low - lengths), (high, -1, lengths - high)):
+        span = min(PIECE_LENGTH * abs(end - (0 if way > 0 else along[-1])), high - low)
+        behind, there = np.interp([end + way * span, end], along, radii)
+        radius = radius + np.maximum(away, 0) * (there - behind) / max(span, TINY)
+    return np.maximum(radius, 0)
 
 
 def _length_inside(skeleton: Any, path: np.ndarray, along: np.ndarray, others: list[np.ndarray]) -> float:

@@ -26,7 +26,7 @@ SLICE_WIDTH = 0.5  # of geodesic distance, over s
 COVER_SCALES = 1.2  # radius around a path in which points need no path of their own, over s
 COVER_RADII = 1.3  # the same over the radius of a part with a surface
 JOIN_SCALES = 8.0  # longest gap that is none, over s
-LEAST_PIECE = 3  # smaller groups of points, farther than that from all others, are left out
+LEAST_PIECE = 3  # smaller groups of points say nothing of a radius, and farther than that from all others are left out
 MEETING_COSINE = 0.8  # how straight ahead of each other two tips meet that are as near as linked points
 
 
@@ -213,10 +213,11 @@ def _meetings(vertices: np.ndarray, edges: np.ndarray, tips: np.ndarray, scale: 
 
 
 def thickness_around(skeleton: Skeleton) -> np.ndarray:
-    """That of points which are not the curve itself; a vertex without any has the one of the nearest with some."""
-    least = SAME_PLACE * np.ptp(skeleton.vertices, axis=0).max()
-    thickness = spread_around(skeleton, least)
-    known = np.flatnonzero(thickness > least)
+    """The same of points that are not the curve itself; where there are too few, as for the nearest vertex with some."""
+    away, vertex = _distances(skeleton)
+    off = away > SAME_PLACE * np.ptp(skeleton.vertices, axis=0).max()
+    thickness = group_median(away[off], vertex[off], len(skeleton.vertices))
+    known = np.flatnonzero(np.bincount(vertex[off], minlength=len(thickness)) >= LEAST_PIECE)
     if not len(known):  # a line
         return thickness
     links = linked(skeleton.vertices, skeleton.edges)
@@ -224,19 +225,23 @@ def thickness_around(skeleton: Skeleton) -> np.ndarray:
     return np.where(nearest < 0, thickness, thickness[nearest])
 
 
-def spread_around(skeleton: Skeleton, least: float = -1) -> np.ndarray:
+def spread_around(skeleton: Skeleton) -> np.ndarray:
     """Median distance from the curve to the points around every vertex and its neighbours, (M,) float array.
 
-    Of points on a tube its radius, and outliers have little say. Points no farther than `least` do not count.
+    Of points on a tube its radius, and outliers have little say.
     """
+    return group_median(*_distances(skeleton), len(skeleton.vertices))
+
+
+def _distances(skeleton: Skeleton) -> tuple[np.ndarray, np.ndarray]:
+    """How far points are from the curve, and each time the vertex, for that of a point and those beside it."""
     m, edges = len(skeleton.vertices), skeleton.edges
     some = np.flatnonzero(skeleton.vertex_of_point >= 0)
     vertex, points = skeleton.vertex_of_point[some], skeleton.points[some]
     edge, t = nearest_on_edges(skeleton.vertices, edges, incident_edges(edges, m)[vertex], points)
     away = norm(points - places_on_edges(skeleton.vertices, edges, edge, t))
-    off = away > least
-    around = steps(linked(skeleton.vertices, edges))[vertex[off]]
-    return group_median(np.repeat(away[off], np.diff(around.indptr)), around.indices, m)
+    around = steps(linked(skeleton.vertices, edges))[vertex]
+    return np.repeat(away, np.diff(around.indptr)), around.indices
 
 
 def drop_spurious(

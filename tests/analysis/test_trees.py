@@ -205,4 +205,4 @@ def test_volume_is_that_of_parts_with_a_surface():
     table = cylinders(upper, 0)
     assert sum(half.volume) == pytest.approx(table.volume[table.confidence > 0].sum())
     assert sum(half.volume) < 0.7 * sum(whole.volume)
-    assert half.traced == pytest.approx(0.5, abs=0.1)
+    assert half.traced == pytest.approx(0.4)  # one of ten cylinders has both
