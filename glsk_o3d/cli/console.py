@@ -115,14 +115,18 @@ def print_rows(rows: Mapping[str, Any], *, title: str = "") -> None:
     print_table(((name, text) for name, text in words.items() if text), wrap=console().file.isatty())
 
 
-def value_in_words(value: Any) -> str:
-    """A value as people read it: each item of a list on a line, those of a tuple behind each other."""
+def value_in_words(value: Any, digits: int = 6) -> str:
+    """A value as people read it: each item of a list on a line, those of a tuple behind each other.
+
+    Of numbers there are so many digits; of large ones, such as coordinates on a map, all ahead of the point, and three.
+    """
     if value is None:
         return ""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
-        return "not known" if math.isnan(value) else f"{value:.6g}"
+        digits = len(f"{abs(value):.0f}") + 3 if 1000 <= abs(value) < 1e12 else digits
+        return "not known" if math.isnan(value) else f"{value:.{digits}g}"
     if isinstance(value, dict):
         known = {name.replace("_", " "): each for name, each in value.items() if each is not None}
         return ", ".join(f"{name} {value_in_words(each)}" for name, each in known.items())

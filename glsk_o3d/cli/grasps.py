@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from .console import echo, print_table
+from .console import echo, print_table, value_in_words
 from .options import argument, option, output_option
 from .outputs import Output, check_outputs, tell, write_each
 
@@ -59,4 +59,5 @@ def _print(best: GraspCandidates, found: int) -> None:
     columns += ["opening", "quality", "seen", "branch"]
     if found:
         heads = [column.removeprefix("position_").replace("_", " ") for column in columns]
-        print_table([[f"{round(grasp[column], 9):.4g}" for column in columns] for grasp in best], heads)
+        cells = [[value_in_words(round(grasp[name], 9), digits=4) for name in columns] for grasp in best]
+        print_table(cells, heads)

@@ -63,6 +63,6 @@ def tree(
     check_outputs(outputs, skeleton)
     curve = read_skeleton(skeleton)
     measures = tree_measures(curve, root, up=up, unit=unit)
-    files = write_each(outputs, cylinders(curve, root)) if output else {}
+    files = write_each(outputs, cylinders(curve, root, up)) if output else {}
     facts = {"skeleton": str(skeleton), **asdict(measures)}
     tell(facts, lambda: print_rows({**facts, "doubts": None}), files)
