@@ -104,7 +104,7 @@ def _cap(end: _End, evidence: Evidence) -> float:
     near = (ahead > -end.radius) & (ahead < NOT_BESIDE * end.radius)
     near &= beside < (NOT_BESIDE * end.radius) ** 2
     facing = np.maximum(evidence.normals[near] @ end.outward, 0)
-    return float(evidence.areas[near] @ facing / (np.pi * end.radius**2))
+    return float(evidence.areas[near] @ facing / max(np.pi * end.radius**2, TINY))
 
 
 def _ends(skeleton: Skeleton) -> Iterator[_End]:

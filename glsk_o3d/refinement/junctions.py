@@ -228,7 +228,7 @@ def meet(
     Gaussian with the distance of a point, and :math:`u_p` with how far its plane is from the sphere, too, so that a
     surface without such a sphere has no say. The junction was `near`, and `radius` is that of the thickest limb there.
     """
-    place, touching, radius = near, radius, max(radius, TINY)
+    place, touching, radius = near, radius, max(radius, TINY ** (1 / 3))  # its square is a divisor
     known = [line for line in lines if line.spread > 0 and line.radius > 0]
     middle, way = np.array([(line.middle, line.way) for line in known]).reshape(-1, 2, 3).transpose(1, 0, 2)
     spread, noise = np.array([(line.spread, line.bend / line.radius + LINE_NOISE) for line in known]).reshape(-1, 2).T
@@ -248,7 +248,7 @@ def meet(
             window, height = np.exp(-dot(offset, offset) / (2 * radius**2)), dot(offset, normals)
             high = np.abs(height)
             fits = window / (1 + ((high - touching) / (SURFACE_FIT * radius)) ** 2)
-            fits *= SURFACE_WEIGHT / max(window.sum(), TINY)
+            fits *= SURFACE_WEIGHT / max(window.sum(), SURFACE_WEIGHT * TINY)  # nothing near, no say
             # of n with the sign of its height, and 1
             matrix[:3, :3] += (fits[:, None] * normals).T @ normals
             matrix[3, :3] = matrix[:3, 3] = np.copysign(fits, height) @ normals

@@ -222,7 +222,9 @@ def thickness_around(skeleton: Skeleton) -> np.ndarray:
         return thickness
     links = linked(skeleton.vertices, skeleton.edges)
     nearest = dijkstra(links, indices=known, return_predecessors=True, min_only=True)[2]
-    return np.where(nearest < 0, thickness, thickness[nearest])
+    reached = nearest >= 0
+    thickness[reached] = thickness[nearest[reached]]
+    return thickness
 
 
 def spread_around(skeleton: Skeleton) -> np.ndarray:
