@@ -99,6 +99,12 @@ class Refiner(Filter[Skeleton]):
         low=0,
     )
 
+    ends: Literal["medial", "surface"] = parameter(
+        "medial",
+        "Where ends stop: half a radius inside a face and at the centre of a round cap, or on the surface, for lengths.",
+        choices=("medial", "surface"),
+    )
+
     def _run(self, given: Skeleton, watch: Watch | None) -> Skeleton:
         if not self.recentre:
             return in_order(self._refined, given)  # every point keeps its vertex
@@ -113,7 +119,8 @@ class Refiner(Filter[Skeleton]):
         if self.recentre and len(skeleton.vertices):
             skeleton = fit_axis(level_wide_ends(skeleton, surface), self.recentre + 1, surface, settle=True)
             size = binary_size(skeleton)  # fourth powers of lengths must not overflow
-            skeleton = scaled(regrow_ends(move_junctions(scaled(skeleton, 1 / size))), size)
+            grown = regrow_ends(move_junctions(scaled(skeleton, 1 / size)), self.ends == "surface")
+            skeleton = scaled(grown, size)
         return measured(aside.put_back(skeleton) if aside else skeleton)
 
     def _fit(self, skeleton: Skeleton) -> tuple[Skeleton, SurfaceGraph]:

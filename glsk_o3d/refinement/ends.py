@@ -39,7 +39,7 @@ ROUND_VARIANCE = 2 / 75  # derived: its variance,
 ROUND_AREA = 1 / 2  # derived: and the weight over that of a flat cap
 
 
-def regrow_ends(skeleton: Skeleton) -> Skeleton:
+def regrow_ends(skeleton: Skeleton, to_surface: bool = False) -> Skeleton:
     r"""Cut every end where a cap may have bent it, and let it grow along its limb to where this stops.
 
     Contraction draws the end of a limb into an edge or a corner of the face that closes it, and the fit follows, since
@@ -53,7 +53,8 @@ def regrow_ends(skeleton: Skeleton) -> Skeleton:
 
     with p and its length s along t seen from the last vertex left. A point whose plane passes the curve by half a
     radius counts half, and those beyond the reach do not count. The fit is made three times, each along t + d of the
-    one before. See `_End.tip` and `_End._cap` for where it stops. No end leaves its points.
+    one before. See `_End.tip` and `_End._cap` for where it stops, which may also be where the axis comes `to_surface`.
+    No end leaves its points.
 
     New vertices come behind all others, with the confidence of the run behind and the radii of their own sections.
     Points of a vertex that was cut belong to the nearest one of the same end. Loops and vertices without edges stay.
@@ -61,7 +62,7 @@ def regrow_ends(skeleton: Skeleton) -> Skeleton:
     if not len(skeleton.leaves):
         return skeleton
     cloud, sections = VertexPoints(skeleton), measure_sections(skeleton)
-    grown = [found for end in _ends(skeleton) if (found := _grow(cloud, sections, *end))]
+    grown = [found for end in _ends(skeleton) if (found := _grow(cloud, sections, *end, to_surface))]
     return _replanted(skeleton, grown) if grown else skeleton
 
 
@@ -90,7 +91,9 @@ def _ends(skeleton: Skeleton) -> Iterator[tuple[np.ndarray, int, bool]]:
                 yield path, int(stays + 1 if leaf.all() else max(short, 1)), bool(leaf.all())
 
 
-def _grow(cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int, other: bool) -> _Grown | None:
+def _grow(
+    cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int, other: bool, to_surface: bool
+) -> _Grown | None:
     """Cut the end of a path, and let it grow anew; None if too few points say where."""
     places, radii, half_widths = cloud.skeleton.vertices[path], sections.radius[path], sections.half_width[path]
     along = arc_lengths(places)
@@ -124,7 +127,7 @@ def _grow(cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int,
         return None
     end = _End.of(points[ahead], cloud.normals[own[ahead]], way, radius)
     behind = _within(along, stop, END_SIZE * radius)
-    tip = end.tip(_Taper.of(along[behind] - stop, radii[behind], radius))
+    tip = end.tip(_Taper.of(along[behind] - stop, radii[behind], radius), to_surface)
     steps = np.diff(along[run])
     step = quantile(steps) if len(steps) else length / last
     tip = max(tip, step / 2)
@@ -216,14 +219,16 @@ class _End(NamedTuple):
         """Directions of the curve so far ahead, (k, 3) float array."""
         return self.way + np.interp(length, self.along, self.steps)[:, None] * self.bend
 
-    def tip(self, taper: _Taper) -> float:
-        """How far the limb goes on.
+    def tip(self, taper: _Taper, to_surface: bool) -> float:
+        """How far the limb goes on, or its axis within it.
 
         Where its last points are much nearer to the axis than it is thick, as on the neck of a bottle, it has the cap
         of that thinner limb.
         """
-        reach = quantile(self.length, END_REACH)
-        return self._cap(self._thinner(taper, reach), reach)
+        reach, farthest = quantile(self.length, END_REACH), float(self.length.max())
+        if to_surface and 2 * taper.at(farthest) < taper.radius:  # hardly any points say where a cone has its apex
+            return min(taper.radius / -taper.slope, farthest)
+        return self._cap(self._thinner(taper, reach), reach, to_surface)
 
     def _thinner(self, taper: _Taper, reach: float) -> _Taper:
         """The limb of the last points, if they are much nearer to the axis than it is thick, and all around it."""
@@ -246,19 +251,19 @@ class _End(NamedTuple):
         around = np.linalg.norm(centre) < ONE_SIDED * radius
         return _Taper(radius, 0.0) if around and radius < END_THINNER * given else taper
 
-    def _cap(self, taper: _Taper, reach: float) -> float:
-        """How far it is to half a radius inside a flat cap, or to the centre of a round one.
+    def _cap(self, taper: _Taper, reach: float, to_surface: bool) -> float:
+        """How far it is to half a radius inside a flat cap, or to the centre of a round one; or to the cap itself.
 
         Let c be the cosine of an outward normal with the axis. The mean length s with the weights c^3 is on a flat cap,
         and .8 radii beyond the centre of a round one; the variance is 0 there and 2/75 squared radii here, so mean - r
         / 2 - 45/4 variance / r is right in both. Averages do not follow single points, as extremes do in noise. What is
         missing of the cap, of an open pipe all of it, counts as if it were where the sides stop: twice as far as their
-        mean.
+        mean. The cap itself is at mean + 15/2 variance / r.
         """
         start = max(reach - taper.at(reach - taper.radius), 0.0)
         late = self.length > start
         if late.sum() < END_POINTS:
-            return max(reach - taper.at(reach) / 2, 0.0)
+            return reach if to_surface else max(reach - taper.at(reach) / 2, 0.0)
         length = self.length[late] - start
         tangent = self.slope(self.length[late])
         normals, points = self.normals[late], self.points[late] - self.curve(np.array([start]))
@@ -267,14 +272,18 @@ class _End(NamedTuple):
         cap = np.maximum(outward + taper.slope / np.hypot(1, taper.slope), 0) ** CAP_POWER
         side = np.maximum(1 - outward**2, 0)
         stop = 2 * (side @ length) / max(side.sum(), TINY)
-        weight, radius = cap.sum(), taper.at(start + stop)
+        weight, radius = float(cap.sum()), taper.at(start + stop)
         mean = cap @ length / max(weight, TINY)
         variance = max(cap @ length**2 / max(weight, TINY) - mean**2, 0)
         # the cap of a tube has half a radius times the area of a unit of its length
         owed = ROUND_AREA * side.sum() * taper.radius / (2 * max(stop, TINY))
         seen = weight / max(owed, weight, TINY)
-        inside = (ROUND_MEAN - 1 / 2) * min(variance / max(ROUND_VARIANCE * radius**2, TINY), 1)
-        tip: float = start + seen * mean + (1 - seen) * stop - (1 / 2 + seen * inside) * radius
+        round_share = min(variance / max(ROUND_VARIANCE * radius**2, TINY), 1)
+        if to_surface:
+            tip = start + seen * (mean + (1 - ROUND_MEAN) * round_share * radius) + (1 - seen) * stop
+            return min(max(tip, 0.0), float(self.length.max()))
+        inside = (ROUND_MEAN - 1 / 2) * round_share
+        tip = start + seen * mean + (1 - seen) * stop - (1 / 2 + seen * inside) * radius
         return min(max(tip, 0.0), reach)
 
 
