@@ -18,6 +18,7 @@ from .refinement.loops import close_loops
 from .refinement.merging import binary_size, collapse_triangles, scaled, with_fields
 from .refinement.spurs import prune_spurs
 from .refinement.subdivision import subdivide_edges
+from .refinement.thin_parts import without_strays
 from .refinement.wide_ends import level_wide_ends
 from .skeleton import Skeleton
 from .tracer import Tracer
@@ -121,6 +122,7 @@ class Refiner(Filter[Skeleton]):
             size = binary_size(skeleton)  # fourth powers of lengths must not overflow
             grown = regrow_ends(move_junctions(scaled(skeleton, 1 / size)), self.ends == "surface")
             skeleton = scaled(grown, size)
+            skeleton = without_strays(skeleton)
         return measured(aside.put_back(skeleton) if aside else skeleton)
 
     def _fit(self, skeleton: Skeleton) -> tuple[Skeleton, SurfaceGraph]:

@@ -174,7 +174,7 @@ def points_around(points: np.ndarray, average: csr_array, spread: np.ndarray) ->
     k = average.nnz // len(points)
     wider = principal_parts(wide_covariances(points, lambda values: average @ values, WIDER_STEPS)[0])[0]
     near = np.maximum(spread.T / k, TINY)
-    sheet = np.minimum(wider[1] / (SHEET_FROM * np.maximum(wider[2], TINY)), 1)
+    sheet = np.clip(wider[1] / (SHEET_FROM * np.maximum(wider[2], TINY)), 0, 1)  # rounding leaves less than nothing
     bent = np.maximum(wider[0] - near[0], 0) / np.maximum((wider[2] / near[2]) ** 2 - 1, TINY)
     bent = sheet * bent + (1 - sheet) * np.maximum(wider[0], 0)
     with np.errstate(divide="ignore"):

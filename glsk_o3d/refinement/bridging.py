@@ -15,6 +15,7 @@ from ..numerics.vectors import TINY, dot, norm
 from ..skeleton import Skeleton
 from .air import HEADING_RADII
 from .evidence import LEAST_INSIDE, Evidence
+from .merging import with_gaps
 from .spurs import NOT_BESIDE
 
 # All fitted but where it says otherwise.
@@ -49,7 +50,8 @@ def bridge_gaps(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
                 bridges.append(sorted(pair))
     if not bridges:
         return skeleton, decisions
-    return replace(skeleton, edges=np.unique(np.concatenate([skeleton.edges, bridges]), axis=0)), decisions
+    bridged = replace(skeleton, edges=np.unique(np.concatenate([skeleton.edges, bridges]), axis=0))
+    return with_gaps(bridged, skeleton.vertices[np.array(bridges)]), decisions
 
 
 def gap_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[tuple[int, int], dict[str, float]]]:

@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from ..numerics.polylines import arc_lengths, place_at, relative_distance
@@ -13,7 +14,7 @@ from ..skeleton import Skeleton
 from .axis_fit import FIT_STAY, axis_box
 from .handles import Handles
 from .limbs import AXIS_LEAVES, AXIS_LENGTH, Limbs, Line
-from .merging import merge_into, with_fields
+from .merging import merge_into, with_fields, with_gaps
 from .sections import SURFACE_FIT, VertexPoints
 
 # All fitted, but for the steps.
@@ -173,7 +174,19 @@ def _straightened(skeleton: Skeleton, limbs: Limbs, places: dict[int, _Place]) -
             own = np.flatnonzero(np.isin(owner, chain))
             away = cdist(skeleton.points[own], vertices[chain]) - radii[chain]
             owner[own] = chain[away.argmin(axis=1)]
-    return with_fields(skeleton, vertices=vertices, radii=radii, confidence=confidence, vertex_of_point=owner)
+    moved = with_fields(skeleton, vertices=vertices, radii=radii, confidence=confidence, vertex_of_point=owner)
+    return with_gaps(moved, _through_air(skeleton, places))
+
+
+def _through_air(skeleton: Skeleton, places: dict[int, _Place]) -> np.ndarray:
+    """Ends of the ways from junctions to their limbs that no point is beside, (g, 2, 3): those of handles in a bowl.
+
+    There, none is within two radii of the thickest limb.
+    """
+    ends = np.array([(it.place, line.lead[:2][-1]) for it in places.values() for line in it.lines]).reshape(-1, 2, 3)
+    thickest = [max(line.radius for line in it.lines) for it in places.values() for _ in it.lines]
+    away = cKDTree(skeleton.points[skeleton.vertex_of_point >= 0]).query(ends.mean(axis=1))[0]
+    return ends[np.isfinite(away) & (away > AXIS_LENGTH * np.array(thickest))]
 
 
 def limb_line(

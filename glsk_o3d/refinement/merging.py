@@ -53,15 +53,22 @@ def drop_edges(skeleton: Skeleton, gone: ArrayLike) -> Skeleton:
     return replace(skeleton, edges=skeleton.edges[~dropped])
 
 
-def drop_lone_vertices(skeleton: Skeleton) -> Skeleton:
-    """Drop vertices without edges, unless there is nothing else; their points go to the nearest vertex left."""
-    left = np.flatnonzero(skeleton.degree > 0)
+def drop_lone_vertices(skeleton: Skeleton, strays: np.ndarray | None = None) -> Skeleton:
+    """Drop vertices without edges, or some of them, unless there is nothing else; points go to the nearest vertex left.
+
+    Those of `strays`, (M,) bool array, have no normals any more.
+    """
+    left = np.flatnonzero(skeleton.degree > 0 if strays is None else ~strays)
     if len(left) in (0, len(skeleton.vertices)):
         return skeleton
     representative = cKDTree(skeleton.vertices[left]).query(skeleton.vertices)[1]
     representative[left] = np.arange(len(left))
+    normals = skeleton.normals
+    if strays is not None:
+        normals = np.where(np.append(strays, False)[skeleton.vertex_of_point][:, None], np.nan, normals)
     return replace(
         skeleton,
+        normals=normals,
         **some_vertices(skeleton, left),
         edges=representative[skeleton.edges],
         vertex_of_point=np.append(representative, -1)[skeleton.vertex_of_point],
@@ -76,6 +83,17 @@ def with_fields(skeleton: Skeleton, **fields: Any) -> Skeleton:
     return made
 
 
+def with_gaps(skeleton: Skeleton, ends: np.ndarray) -> Skeleton:
+    """The same, with stretches of its curve in its report that no point supports, by their ends, (g, 2, 3) float array."""
+    joined = (*skeleton.report.joined, *as_gaps(ends))
+    return with_fields(skeleton, report=replace(skeleton.report, joined=joined))
+
+
+def as_gaps(ends: np.ndarray) -> tuple[Any, ...]:
+    """Ends of gaps, (g, 2, 3) float array, as `Report.joined` has them."""
+    return tuple((tuple(a), tuple(b)) for a, b in ends.tolist())
+
+
 def binary_size(skeleton: Skeleton) -> float:
     """The power of two next to the extent of a skeleton, so that scaling by it rounds nothing; 1 if it has none."""
     extent = np.ptp(skeleton.vertices, axis=0).max(initial=0)
@@ -85,7 +103,8 @@ def binary_size(skeleton: Skeleton) -> float:
 def scaled(skeleton: Skeleton, factor: float) -> Skeleton:
     """The same in another unit of length."""
     lengths = ("vertices", "points", "radii", "half_width", "half_thickness")
-    return with_fields(skeleton, **{name: factor * getattr(skeleton, name) for name in lengths})
+    report = replace(skeleton.report, joined=as_gaps(factor * np.array(skeleton.report.joined)))
+    return with_fields(skeleton, report=report, **{name: factor * getattr(skeleton, name) for name in lengths})
 
 
 def collapse_triangles(skeleton: Skeleton, by_degree: bool = False) -> Skeleton:

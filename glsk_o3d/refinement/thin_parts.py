@@ -14,7 +14,8 @@ from ..numerics.neighbourhoods import nearest_neighbours
 from ..numerics.vectors import COLUMNS, ROWS, TINY
 from ..numerics.winding import AREA_NEIGHBOURS
 from ..skeleton import Skeleton
-from .diagnostics import SHEET_SHARE, STUB_LENGTH
+from .diagnostics import MAJORITY, SHEET_SHARE, STUB_LENGTH
+from .merging import drop_lone_vertices
 from .sections import VertexPoints
 
 SAME_PLACE = 1e-6  # derived: share of the cloud's extent below which points are not apart
@@ -73,6 +74,19 @@ def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
     growth, flat = (group_sum(facts, vertex, m) / np.maximum(count, 1)[:, None]).T
     thin &= growth < np.where(flat < SHEET_SHARE, SURFACE_GROWTH, SHEET_GROWTH)
     return (_share_around(near, count, thin) > 1 - least) & ~_surely_with_surface(skeleton)
+
+
+def without_strays(skeleton: Skeleton) -> Skeleton:
+    """The same without vertices that nothing is joined to, and of which so few points say nothing.
+
+    They are fewer than `LEAST_POINTS`, and than half of those of the largest component: a clump of flying points.
+    """
+    m, owner, lone = len(skeleton.vertices), skeleton.vertex_of_point, skeleton.degree == 0
+    if not lone.any():
+        return skeleton
+    count = np.bincount(owner[owner >= 0], minlength=m)
+    largest = np.bincount(skeleton.component_of_vertex, count).max()
+    return drop_lone_vertices(skeleton, lone & (count < min(LEAST_POINTS, MAJORITY * largest)))
 
 
 def may_lack_surface(skeleton: Skeleton, least: float) -> bool:

@@ -17,9 +17,9 @@ from ..numerics.near_links import LINK_SPACINGS, join_pieces, linked, slice_cent
 from ..numerics.polylines import incident_edges, nearest_on_edges, places_on_edges
 from ..numerics.vectors import dot, norm, unit
 from ..skeleton import NOT_MEASURED, Skeleton
-from .merging import merge_into
+from .merging import merge_into, with_gaps
 from .rooted import numbered_from, root_among
-from .thin_parts import SAME_PLACE, SpacedPoints, mostly_on_loops, without_surface
+from .thin_parts import SAME_PLACE, SpacedPoints, mostly_on_loops, without_strays, without_surface
 
 # All fitted, on trees whose twigs are thinner than their points are far apart; s is the median scale of the points.
 SLICE_WIDTH = 0.5  # of geodesic distance, over s
@@ -62,15 +62,14 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
     if point.any() and len(traced.edges):
         traced = replace(traced, radii=np.where(point, thickness_around(traced), traced.radii))
     loose = thin[skeleton.vertex_of_point] & (skeleton.vertex_of_point >= 0)
-    report = replace(
-        skeleton.report,
-        n_traced=int(loose.sum()),
-        joined=tuple((tuple(a), tuple(b)) for a, b in mixed.places[joined].tolist()),
-    )
-    if root is not None:
+    traced = with_gaps(traced, mixed.places[joined])
+    report = replace(traced.report, n_traced=int(loose.sum()))
+    if root is None:
+        traced = without_strays(traced)
+    else:
         traced = numbered_from(traced, int(np.searchsorted(stays, paths.index[roots[0]])))
         report = replace(report, root=tuple(traced.vertices[0].tolist()))
-    return replace(traced, normals=np.where(loose[:, None], np.nan, skeleton.normals), report=report)
+    return replace(traced, normals=np.where(loose[:, None], np.nan, traced.normals), report=report)
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,8 +177,8 @@ def _assembled(skeleton: Skeleton, mixed: _Mixed, paths: _Paths, tree: bool) -> 
     degree, point = np.bincount(edges.ravel(), minlength=len(nodes)), nodes < mixed.n
     inner = (point & (degree > 1))[:, None]
     vertices = np.where(inner, paths.centre[nodes], mixed.places[nodes])
-    if not tree:
-        edges = np.concatenate([edges, _meetings(vertices, edges, point & (degree == 1), mixed.scale)])
+    met = np.empty((0, 2), int) if tree else _meetings(vertices, edges, point & (degree == 1), mixed.scale)
+    edges = np.concatenate([edges, met])
     index = np.full(len(skeleton.vertices), -1)
     index[mixed.vertices] = paths.index[mixed.n :]
     owner = skeleton.vertex_of_point
@@ -191,7 +190,7 @@ def _assembled(skeleton: Skeleton, mixed: _Mixed, paths: _Paths, tree: bool) -> 
     radii[~point], confidence[~point] = skeleton.radii[stays], skeleton.confidence[stays]
     edges = np.unique(np.sort(edges, axis=1), axis=0)
     made = dict(vertices=vertices, edges=edges, radii=radii, confidence=confidence, vertex_of_point=vertex)
-    traced = replace(skeleton, **NOT_MEASURED | made)
+    traced = with_gaps(replace(skeleton, **NOT_MEASURED | made), vertices[met])
     if point.any() and len(edges):
         traced = replace(traced, radii=np.where(point, spread_around(traced), radii))
     return traced
