@@ -17,6 +17,7 @@ from .figures import INK, PAPER
 
 _RED, _AMBER = "#d0121f", "#a05000"
 _LINE_HEIGHT, _LETTER_WIDTH, _MOST_LINES, _MOST_WARNINGS = 0.16, 0.066, 2, 2  # inches; lines of each warning, warnings
+_TITLE_SIZE = 1.5  # over the size of the other letters
 _FAR_DOT, _NEAR_DOT = np.array([0.89] * 3), np.array([0.64] * 3)
 ROOT_MARK = {"marker": "D", "s": 22, "facecolors": "#1f5fbf", "edgecolors": "white", "linewidths": 0.6, "label": "root"}
 """How the place is drawn that a tree grows from."""
@@ -72,8 +73,12 @@ def draw(skeleton: Skeleton, title: str | None = None) -> Any:
     room = _LINE_HEIGHT * (_MOST_LINES * _MOST_WARNINGS + 1) if report.warnings else 0
     figure = figures.new_figure(figures.fitting_size(extent, head=head, foot=foot + room))
     width, height = figure.get_size_inches()
+    told = "   ".join(f"{name.replace('_', ' ')} {value}".replace(" ", "\xa0") for name, value in counts(skeleton).items())
+    counted = [line.replace("\xa0", " ") for line in _wrapped(told, width)]
     warned = _warned(report.warnings, width)
-    below = _LINE_HEIGHT * len(warned)
+    heads = _wrapped(figures.printable(title or ""), width / _TITLE_SIZE)
+    below, head = _LINE_HEIGHT * len(warned), head + _TITLE_SIZE * _LINE_HEIGHT * max(len(heads) - 1, 0)
+    foot += _LINE_HEIGHT * (len(counted) - 1)
     for a, b, axes in figures.three_views(figure, extent, head=head, foot=foot + below):
         scale = 72 * axes.get_position().width * width / extent[a]  # points per unit
         _draw_cloud(axes, cloud - centre, a, b, scale**2 * np.prod(np.sort(extent)[1:]))
@@ -82,13 +87,13 @@ def draw(skeleton: Skeleton, title: str | None = None) -> Any:
         if report.root:
             axes.scatter(*np.subtract(report.root, centre)[[a, b]], **ROOT_MARK, zorder=4, clip_on=False)
     style = dict(ha="center", parse_math=False)
-    told = (f"{name.replace('_', ' ')} {value}" for name, value in counts(skeleton).items())
-    figure.text(0.5, (0.12 + below) / height, "   ".join(told), color=INK, fontsize=8, **style)
-    for row, line in enumerate(reversed(warned)):
-        place = (0.1 + row * _LINE_HEIGHT) / height
-        figure.text(0.5, place, figures.printable(line), color=_AMBER, fontsize=8, **style)
-    if title:
-        figure.text(0.5, 1 - 0.33 / height, figures.printable(title), color=INK, fontsize=12, **style)
+    lines = [*((line, INK, 0.12) for line in counted), *((line, _AMBER, 0.1) for line in warned)]
+    for row, (line, color, up) in enumerate(reversed(lines)):
+        place = (up + row * _LINE_HEIGHT) / height
+        figure.text(0.5, place, figures.printable(line), color=color, fontsize=8, **style)
+    for row, line in enumerate(heads):
+        place = 1 - (0.33 + row * _TITLE_SIZE * _LINE_HEIGHT) / height
+        figure.text(0.5, place, line, color=INK, fontsize=8 * _TITLE_SIZE, **style)
     return figure
 
 
@@ -135,11 +140,14 @@ def _mark_doubts(axes: Any, report: Report, centre: np.ndarray, across_up: list[
         axes.annotate(note, (x, y), (6, 4), textcoords="offset points", color=_AMBER, fontsize=6, annotation_clip=False)
 
 
+def _wrapped(text: str, width: float) -> list[str]:
+    """A text in at most two lines of small letters as wide as a picture."""
+    letters = int((width - 2 * figures.VIEW_GAP) / _LETTER_WIDTH)
+    return textwrap.wrap(text, letters, max_lines=_MOST_LINES, placeholder=" ...", break_on_hyphens=False)
+
+
 def _warned(warnings: Sequence[str], width: float) -> list[str]:
     """The first two warnings in two lines each, and how many more there are."""
-    letters = int((width - 2 * figures.VIEW_GAP) / _LETTER_WIDTH)
-    lines: list[str] = []
-    for warning in warnings[:_MOST_WARNINGS]:
-        lines += textwrap.wrap(f"warning: {warning}", letters, max_lines=_MOST_LINES, placeholder=" ...")
+    lines = [line for warning in warnings[:_MOST_WARNINGS] for line in _wrapped(f"warning: {warning}", width)]
     more = len(warnings) - _MOST_WARNINGS
     return [*lines, *[f"and {more} more warning{'s' * (more > 1)}"] * (more > 0)]
