@@ -102,14 +102,15 @@ class Refiner(Filter[Skeleton]):
 
     ends: Literal["medial", "surface"] = parameter(
         "medial",
-        "Where ends stop: half a radius inside a face and at the centre of a round cap, or on the surface, for lengths.",
+        "Where ends stop: half a radius inside a face, and at the centre of a round cap; or on the surface.",
         choices=("medial", "surface"),
     )
 
     def _run(self, given: Skeleton, watch: Watch | None) -> Skeleton:
         if not self.recentre:
             return in_order(self._refined, given)  # every point keeps its vertex
-        return on_sample(lambda skeleton: in_order(self._refined, skeleton), given)
+        refined = on_sample(lambda skeleton: in_order(self._refined, skeleton), given)
+        return without_strays(refined) if self.air else refined
 
     def _refined(self, skeleton: Skeleton) -> Skeleton:
         skeleton, surface = self._fit(skeleton)
@@ -122,7 +123,6 @@ class Refiner(Filter[Skeleton]):
             size = binary_size(skeleton)  # fourth powers of lengths must not overflow
             grown = regrow_ends(move_junctions(scaled(skeleton, 1 / size)), self.ends == "surface")
             skeleton = scaled(grown, size)
-            skeleton = without_strays(skeleton)
         return measured(aside.put_back(skeleton) if aside else skeleton)
 
     def _fit(self, skeleton: Skeleton) -> tuple[Skeleton, SurfaceGraph]:

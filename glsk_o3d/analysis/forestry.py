@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InvalidParameterError, SkeletonWarning
+from ..errors import SkeletonWarning
 from ..numerics.neighbourhoods import plane_axes
 from ..numerics.vectors import TINY, along_axis, norm
 from ..numerics.vectors import unit as directions

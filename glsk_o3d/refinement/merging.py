@@ -54,21 +54,14 @@ def drop_edges(skeleton: Skeleton, gone: ArrayLike) -> Skeleton:
 
 
 def drop_lone_vertices(skeleton: Skeleton, strays: np.ndarray | None = None) -> Skeleton:
-    """Drop vertices without edges, or some of them, unless there is nothing else; points go to the nearest vertex left.
-
-    Those of `strays`, (M,) bool array, have no normals any more.
-    """
+    """Drop vertices without edges, or `strays` (M,), unless there is nothing else; points go to the nearest left."""
     left = np.flatnonzero(skeleton.degree > 0 if strays is None else ~strays)
     if len(left) in (0, len(skeleton.vertices)):
         return skeleton
     representative = cKDTree(skeleton.vertices[left]).query(skeleton.vertices)[1]
     representative[left] = np.arange(len(left))
-    normals = skeleton.normals
-    if strays is not None:
-        normals = np.where(np.append(strays, False)[skeleton.vertex_of_point][:, None], np.nan, normals)
     return replace(
         skeleton,
-        normals=normals,
         **some_vertices(skeleton, left),
         edges=representative[skeleton.edges],
         vertex_of_point=np.append(representative, -1)[skeleton.vertex_of_point],
@@ -84,14 +77,9 @@ def with_fields(skeleton: Skeleton, **fields: Any) -> Skeleton:
 
 
 def with_gaps(skeleton: Skeleton, ends: np.ndarray) -> Skeleton:
-    """The same, with stretches of its curve in its report that no point supports, by their ends, (g, 2, 3) float array."""
-    joined = (*skeleton.report.joined, *as_gaps(ends))
+    """The same; its report has the ends, (g, 2, 3) float array, of more stretches that no point supports."""
+    joined = (*skeleton.report.joined, *((tuple(a), tuple(b)) for a, b in ends.tolist()))
     return with_fields(skeleton, report=replace(skeleton.report, joined=joined))
-
-
-def as_gaps(ends: np.ndarray) -> tuple[Any, ...]:
-    """Ends of gaps, (g, 2, 3) float array, as `Report.joined` has them."""
-    return tuple((tuple(a), tuple(b)) for a, b in ends.tolist())
 
 
 def binary_size(skeleton: Skeleton) -> float:
@@ -103,8 +91,10 @@ def binary_size(skeleton: Skeleton) -> float:
 def scaled(skeleton: Skeleton, factor: float) -> Skeleton:
     """The same in another unit of length."""
     lengths = ("vertices", "points", "radii", "half_width", "half_thickness")
-    report = replace(skeleton.report, joined=as_gaps(factor * np.array(skeleton.report.joined)))
-    return with_fields(skeleton, report=report, **{name: factor * getattr(skeleton, name) for name in lengths})
+    gaps, blank = factor * np.array(skeleton.report.joined), replace(skeleton.report, joined=())
+    return with_gaps(
+        with_fields(skeleton, report=blank, **{name: factor * getattr(skeleton, name) for name in lengths}), gaps
+    )
 
 
 def collapse_triangles(skeleton: Skeleton, by_degree: bool = False) -> Skeleton:

@@ -1,5 +1,6 @@
 """Tell where a cloud shows no surface: where its parts are thinner than its points are far apart."""
 
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +16,7 @@ from ..numerics.vectors import COLUMNS, ROWS, TINY
 from ..numerics.winding import AREA_NEIGHBOURS
 from ..skeleton import Skeleton
 from .diagnostics import MAJORITY, SHEET_SHARE, STUB_LENGTH
-from .merging import drop_lone_vertices
+from .merging import drop_lone_vertices, with_fields
 from .sections import VertexPoints
 
 SAME_PLACE = 1e-6  # derived: share of the cloud's extent below which points are not apart
@@ -77,16 +78,21 @@ def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
 
 
 def without_strays(skeleton: Skeleton) -> Skeleton:
-    """The same without vertices that nothing is joined to, and of which so few points say nothing.
+    """The same without vertices that nothing is joined to and that have few points: clumps of flying ones, outliers.
 
-    They are fewer than `LEAST_POINTS`, and than half of those of the largest component: a clump of flying points.
+    They are fewer than `LEAST_POINTS`, and than half of those of the largest component. Some edge must be left.
     """
-    m, owner, lone = len(skeleton.vertices), skeleton.vertex_of_point, skeleton.degree == 0
-    if not lone.any():
+    count, owner, report = VertexPoints(skeleton).count, skeleton.vertex_of_point, skeleton.report
+    least = min(LEAST_POINTS, MAJORITY * np.bincount(skeleton.component_of_vertex, count).max(initial=0))
+    strays = (skeleton.degree == 0) & (count < least)
+    if not strays.any() or not len(skeleton.edges):
         return skeleton
-    count = np.bincount(owner[owner >= 0], minlength=m)
-    largest = np.bincount(skeleton.component_of_vertex, count).max()
-    return drop_lone_vertices(skeleton, lone & (count < min(LEAST_POINTS, MAJORITY * largest)))
+    gone = np.append(strays, False)[owner] & ~np.isnan(skeleton.normals[:, 0])
+    distinct = len(np.unique(skeleton.points[gone], axis=0))
+    n_outliers, n_distinct = report.n_outliers + int(gone.sum()), report.n_distinct - distinct
+    report = replace(report, n_outliers=n_outliers, n_distinct=n_distinct)
+    normals = np.where(gone[:, None], np.nan, skeleton.normals)
+    return drop_lone_vertices(with_fields(skeleton, normals=normals, report=report), strays)
 
 
 def may_lack_surface(skeleton: Skeleton, least: float) -> bool:

@@ -212,7 +212,7 @@ def _meetings(vertices: np.ndarray, edges: np.ndarray, tips: np.ndarray, scale: 
 
 
 def thickness_around(skeleton: Skeleton) -> np.ndarray:
-    """The same of points that are not the curve itself; where there are too few, as for the nearest vertex with some."""
+    """The same of points that are not the curve itself; where they are too few, that of the nearest with more."""
     away, vertex = _distances(skeleton)
     off = away > SAME_PLACE * np.ptp(skeleton.vertices, axis=0).max()
     thickness = group_median(away[off], vertex[off], len(skeleton.vertices))

@@ -73,8 +73,8 @@ def draw(skeleton: Skeleton, title: str | None = None) -> Any:
     room = _LINE_HEIGHT * (_MOST_LINES * _MOST_WARNINGS + 1) if report.warnings else 0
     figure = figures.new_figure(figures.fitting_size(extent, head=head, foot=foot + room))
     width, height = figure.get_size_inches()
-    told = "   ".join(f"{name.replace('_', ' ')} {value}".replace(" ", "\xa0") for name, value in counts(skeleton).items())
-    counted = [line.replace("\xa0", " ") for line in _wrapped(told, width)]
+    told = (f"{name}_{value}" for name, value in counts(skeleton).items())
+    counted = [line.replace("_", " ") for line in _wrapped("   ".join(told), width)]
     warned = _warned(report.warnings, width)
     heads = _wrapped(figures.printable(title or ""), width / _TITLE_SIZE)
     below, head = _LINE_HEIGHT * len(warned), head + _TITLE_SIZE * _LINE_HEIGHT * max(len(heads) - 1, 0)
