@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -258,9 +257,14 @@ def drop_spurious(
     stays = np.arange(len(skeleton.vertices))
     scatter = math.sqrt(math.log2(max(int((skeleton.vertex_of_point >= 0).sum()), 1)))
     while True:
-        forks, tips, body, twig = _twigs(skeleton, traced, root)
-        if not len(tips):
+        twigs = _twigs(skeleton, traced, root)
+        if not twigs:
             return skeleton, stays
+        forks, tips = np.array([path[[0, -1]] for path in twigs]).T
+        body, twig = (
+            np.concatenate([path[1:] for path in twigs]),
+            np.repeat(np.arange(len(tips)), [len(path) - 1 for path in twigs]),
+        )
         rest = np.delete(np.arange(len(traced)), body)
         away, nearest = cKDTree(skeleton.vertices[rest]).query(skeleton.vertices[tips])
         beside = rest[nearest]
@@ -279,33 +283,9 @@ def drop_spurious(
         skeleton = replace(skeleton, radii=np.where(traced, spread_around(skeleton), skeleton.radii))
 
 
-class _Twigs(NamedTuple):
-    """Branches that end: where they fork off and their tips, and of every vertex of theirs, which it is and whose."""
-
-    forks: np.ndarray
-    tips: np.ndarray
-    body: np.ndarray
-    twig: np.ndarray
-
-
-def _twigs(skeleton: Skeleton, traced: np.ndarray, root: int | None) -> _Twigs:
-    """Traced branches that end, up to the junctions that they leave."""
-    degree, free, beside = skeleton.degree, traced.copy(), np.zeros(len(traced), int)
-    if root is not None:
-        free[root] = False
-    np.bitwise_xor.at(beside, skeleton.edges, skeleton.edges[:, ::-1])  # of two neighbours, to know one from the other
-    tips = np.flatnonzero((degree == 1) & free)
-    here, forks, which = tips, np.full(len(tips), -1), np.arange(len(tips))
-    before, vertices, twig = np.zeros(len(tips), int), [tips[:0]], [which[:0]]
-    while len(here):
-        vertices.append(here)
-        twig.append(which)
-        here, before = beside[here] ^ before, here
-        at_fork = degree[here] > 2
-        forks[which[at_fork]] = here[at_fork]
-        on = (degree[here] == 2) & free[here]
-        here, before, which = here[on], before[on], which[on]
-    some = forks >= 0
-    body, owner = np.concatenate(vertices), np.concatenate(twig)
-    left = some[owner]
-    return _Twigs(forks[some], tips[some], body[left], (np.cumsum(some) - 1)[owner[left]])
+def _twigs(skeleton: Skeleton, traced: np.ndarray, root: int | None) -> list[np.ndarray]:
+    """Traced branches that end, as paths from the junctions that they leave, by their tips."""
+    degree, free = skeleton.degree, traced & (np.arange(len(traced)) != (-1 if root is None else root))
+    paths = [branch[::-1] if degree[branch[0]] == 1 else branch for branch in skeleton.branches]
+    found = [path for path in paths if degree[path[0]] > 2 and degree[path[-1]] == 1 and free[path[1:]].all()]
+    return sorted(found, key=lambda path: int(path[-1]))
