@@ -123,10 +123,9 @@ def cylinders(skeleton: Any, root: Any = None, up: str | None = None) -> Cylinde
             others = [before, *np.flatnonzero(beside & (table.parent == before)).tolist()]
             start = _length_inside(skeleton, path, along, [skeleton.branches[other] for other in others])
         else:
-            start = -_as_cylinder(beyond.get(int(path[0]), 0.0), skeleton.radii[path[1]])
-            if before < 0:
-                start = _begun(skeleton, path, along, start, up)
-        stop = along[-1] + _as_cylinder(beyond.get(int(path[-1]), 0.0), skeleton.radii[path[-2]])
+            start = -beyond.get(int(path[0]), 0.0)
+            start = start if before >= 0 else _begun(skeleton, path, along, start, up)
+        stop = along[-1] + beyond.get(int(path[-1]), 0.0)
         if stop <= start:
             continue
         pieces = max(round((stop - start) / (PIECE_LENGTH * max(table.mean_radius[row], 1e-3 * (stop - start)))), 1)
@@ -135,8 +134,8 @@ def cylinders(skeleton: Any, root: Any = None, up: str | None = None) -> Cylinde
         ends = np.linspace(start, stop, pieces + 1)
         places = _place_beyond(skeleton.vertices[path], along, ends)
         inside = ends[:-1, None] + np.diff(ends)[:, None] * (np.arange(RADIUS_SAMPLES) + 0.5) / RADIUS_SAMPLES
-        closed = [skeleton.radii[path[k]] if int(path[end]) in beyond else 0.0 for k, end in ((1, 0), (-2, -1))]
-        radius = np.sqrt((_radius_at(inside, along, skeleton.radii[path], *closed) ** 2).mean(axis=1))
+        sides = _sides(skeleton.radii[path], along, [beyond.get(end, 0) > 0 for end in path[[0, -1]].tolist()])
+        radius = np.sqrt((np.interp(inside, along, sides) ** 2).mean(axis=1))
         confidence = np.interp(inside, along, skeleton.confidence[path]).mean(axis=1)
         for i in range(pieces):
             size = (radius[i], ends[i + 1] - ends[i])
@@ -168,11 +167,11 @@ def points_near(skeleton: Any) -> np.ndarray:
 
 
 def lowest_around(skeleton: Any, foot: np.ndarray, onward: np.ndarray, radius: float, up: str) -> float:
-    """How high the lowest point is within three radii of the foot of a stem; as the foot, if it does not rise onward."""
+    """How high the lowest point within three radii of the foot of a stem is; if it leads down, how high the foot is."""
     height, ahead = along_axis(np.array([foot, onward]), up)
     points = skeleton.points[points_near(skeleton)]
-    points = points[norm(points - foot) <= OUTSIDE * radius]
-    return float(along_axis(points, up).min(initial=np.inf if len(points) else height) if ahead > height else height)
+    low = along_axis(points[norm(points - foot) <= OUTSIDE * radius], up)
+    return float(low.min() if len(low) and ahead > height - OUTSIDE * radius else height)
 
 
 def _begun(skeleton: Any, path: np.ndarray, along: np.ndarray, start: float, up: str) -> float:
@@ -184,26 +183,18 @@ def _begun(skeleton: Any, path: np.ndarray, along: np.ndarray, start: float, up:
     return float(np.interp(lowest, height[k - 1 : k + 1], lengths[k - 1 : k + 1])) if k else start
 
 
-def _as_cylinder(beyond: float, radius: float) -> float:
-    """How far a cylinder goes on with the volume of an end so far `beyond` the tip: half a radius flat, and one round.
-
-    A round cap has the volume of a cylinder two thirds as high.
-    """
-    return beyond - 2 / 3 * min(max(beyond - radius / 2, 0), radius / 2)
-
-
-def _radius_at(lengths: np.ndarray, along: np.ndarray, radii: np.ndarray, first: float, last: float) -> np.ndarray:
-    """Radii at some lengths along a branch; so near its ends as the taper behind says: a face at an end has a say in them.
-
-    The taper is that of four times as much.
-    """
-    low, high = min(first, along[-1] / 4), along[-1] - min(last, along[-1] / 4)
-    radius = np.interp(np.clip(lengths, low, high), along, radii)
-    for end, way, away in ((low, 1, low - lengths), (high, -1, lengths - high)):
-        span = min(PIECE_LENGTH * abs(end - (0 if way > 0 else along[-1])), high - low)
-        behind, there = np.interp([end + way * span, end], along, radii)
-        radius = radius + np.maximum(away, 0) * (there - behind) / max(span, TINY)
-    return np.maximum(radius, 0)
+def _sides(radii: np.ndarray, along: np.ndarray, free: list[bool]) -> np.ndarray:
+    """The radii along a branch; near its free ends, where a face has a say in them, as the taper behind has them."""
+    radii = radii.copy()
+    for side, is_free in zip((slice(None), slice(None, None, -1)), free, strict=True):
+        away, radius = np.abs(along - along[side][0])[side], radii[side]
+        reach = min(radius[1], along[-1] / (1 + PIECE_LENGTH))
+        if is_free and reach > 0:
+            there, behind = np.interp([reach, (1 + PIECE_LENGTH) * reach], away, radius)
+            close = away < reach
+            taper = (there - behind) / (PIECE_LENGTH * reach)
+            radius[close] = np.clip(there + taper * (reach - away[close]), there / 2, 2 * there)
+    return radii
 
 
 def _length_inside(skeleton: Any, path: np.ndarray, along: np.ndarray, others: list[np.ndarray]) -> float:
@@ -227,7 +218,10 @@ def _length_inside(skeleton: Any, path: np.ndarray, along: np.ndarray, others: l
 
 
 def _beyond_tips(skeleton: Any) -> dict[int, float]:
-    """How far the part goes on beyond every tip of the curve, by its points: by vertex."""
+    """How far a cylinder goes on beyond every tip of the curve, by vertex, so that it has the volume of the end there.
+
+    By its points the end is half a radius beyond the tip if it is flat, and one if it is round, with two thirds of it.
+    """
     ends = np.concatenate([skeleton.edges, skeleton.edges[:, ::-1]])
     ends = ends[skeleton.degree[ends[:, 0]] == 1]
     members = Members(skeleton.vertex_of_point, len(skeleton.vertices))
@@ -240,7 +234,8 @@ def _beyond_tips(skeleton: Any) -> dict[int, float]:
             along = offset @ ahead
             aside = norm(offset - along[:, None] * ahead)
             reach = np.quantile(along[aside <= max(OUTSIDE * skeleton.radii[beside], aside.min())], TIP_QUANTILE)
-            beyond[tip] = max(float(reach), 0.0)
+            half = skeleton.radii[beside] / 2
+            beyond[tip] = max(float(reach - 2 / 3 * np.clip(reach - half, 0, half)), 0.0)
     return beyond
 
 

@@ -91,10 +91,9 @@ def binary_size(skeleton: Skeleton) -> float:
 def scaled(skeleton: Skeleton, factor: float) -> Skeleton:
     """The same in another unit of length."""
     lengths = ("vertices", "points", "radii", "half_width", "half_thickness")
-    gaps, blank = factor * np.array(skeleton.report.joined), replace(skeleton.report, joined=())
-    return with_gaps(
-        with_fields(skeleton, report=blank, **{name: factor * getattr(skeleton, name) for name in lengths}), gaps
-    )
+    made = {name: factor * getattr(skeleton, name) for name in lengths}
+    blank = with_fields(skeleton, **made, report=replace(skeleton.report, joined=()))
+    return with_gaps(blank, factor * np.array(skeleton.report.joined))
 
 
 def collapse_triangles(skeleton: Skeleton, by_degree: bool = False) -> Skeleton:
