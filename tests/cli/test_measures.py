@@ -11,6 +11,7 @@ import pytest
 from glsk_o3d import Skeleton, pipelines, read_skeleton, samples, save_skeleton
 from glsk_o3d.analysis import branch_table, cylinders, tree_measures
 from glsk_o3d.analysis.branches import PRINTED_COLUMNS
+from glsk_o3d.cli.console import value_in_words
 
 
 def test_branches_table_file_and_json_agree(invoke, tmp_path, y):
@@ -89,3 +90,33 @@ def test_a_tree_taller_than_any_is_in_doubt(invoke, tmp_path, y):
     first, _ = invoke("tree", "mm.ply", "--up", "z", "--root", "z").stderr.splitlines()
     assert first.endswith("none is known above 116 m: is a unit of the cloud 1 m? give its metres, such as 0.001")
     assert invoke("tree", "mm.ply", "--unit", "0.001", "--up", "z", "--root", "z").stderr == ""
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        ((512345.678, 5312345.678, 0.69), "512345.678 5312345.678 0.69"),
+        (-512345.6785, "-512345.678"),
+        (999.9996, "1000"),
+        (123456789.5, "123456789.5"),
+        (1234.5, "1234.5"),
+        (0.000123456789, "0.000123457"),
+        (1e300, "1e+300"),
+        (float("inf"), "inf"),
+        (float("nan"), "not known"),
+    ],
+)
+def test_coordinates_are_printed_whole(value, text):
+    assert value_in_words(value) == text
+
+
+def test_the_foot_of_a_tree_on_a_map_is_printed_whole(invoke, tmp_path):
+    """In metres of a national grid."""
+    offset = np.array([512345.678, 5312345.678, 431.25])
+    save_skeleton(pipelines.tree("x")(samples.tube(2000, length=2, radius=0.1).points + offset), tmp_path / "t.json")
+    rows = invoke("tree", "t.json", "-o", "c.csv").stdout.splitlines()
+    (root,) = (row.split()[1:] for row in rows if row.split()[:1] == ["root"])
+    table = (tmp_path / "c.csv").read_text().splitlines()
+    start = [float(value) for value in table[1].split(",")[1:4]]
+    np.testing.assert_allclose([float(value) for value in root], start, atol=6e-4)
+    assert not any("e+" in line for line in [*rows, *table[1:]])

@@ -177,3 +177,21 @@ def test_what_samples_disagree_with_is_marked(tree, tmp_path):
         amber.append(int(near.sum()))
     assert amber[0] == 0
     assert 50 < amber[1] < amber[2]
+
+
+@pytest.mark.parametrize("title", ["a", "plot_17_tree_0042_" * 6 + "south.laz", "a scan of many words " * 12])
+def test_words_on_the_picture_of_a_tall_object_stay_in_it(title):
+    """It is narrow: titles and counts are broken to its width, and nothing is drawn over something else."""
+    tall = Skeleton([[0, 0, 0], [0.1, 0, 50], [0, 0, 100]], [(0, 1), (1, 2)], np.ones(3), (), (), ())
+    tall = dataclasses.replace(tall, report=Report(n_input=123_456_789, warnings=("much is wrong " * 30,)))
+    figure = preview.draw(tall, title)
+    width, height = figure.get_size_inches() * figure.dpi
+    boxes = [text.get_window_extent() for text in figure.texts]
+    assert width < 1000
+    assert all(0 <= box.x0 < box.x1 <= width and 0 <= box.y0 < box.y1 <= height for box in boxes)
+    boxes.sort(key=lambda box: box.y0)
+    apart = [a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[i + 1 :]]
+    assert not any(apart)
+    words = [text.get_text() for text in figure.texts]
+    assert any("points 123,456,789" in line for line in words)
+    assert any("length" in line for line in words)

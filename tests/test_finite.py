@@ -1,0 +1,142 @@
+"""Nothing between two filters, or two steps of the Refiner, holds a number that is not finite, whatever the cloud."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+from glsk_o3d import InvalidCloudError, Skeleton, Tracer, pipelines, refiner, samples
+from glsk_o3d.refinement.junctions import meet
+from glsk_o3d.refinement.limbs import Line
+
+pytestmark = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+UNKNOWN = {"normals": "points without one", "support": "not measured", "points": "checked where they come in"}
+STEPS = ("fit_axis", "regrow_ends", "move_junctions", "level_wide_ends", "subdivide_edges", "pull_back_detached")
+
+BEFORE_A_FIT = ("Connector", "pull_back_detached", "subdivide_edges")
+"""What gives skeletons whose confidence is not measured yet."""
+
+
+def lines(n, ways):
+    return np.concatenate([np.linspace(0, 1, n)[:, None] * way for way in ways])
+
+
+def grid(*sizes):
+    return np.stack(np.meshgrid(*map(np.arange, sizes)), axis=-1).reshape(-1, 3).astype(float)
+
+
+def clouds():
+    """Shapes without thickness, on grids, in clumps, and few points of ordinary ones."""
+    rng = np.random.default_rng(0)
+    turn = np.linspace(0, 2 * np.pi, 80, endpoint=False)
+    yield "line", lines(60, [(1.0, 2, 3)])
+    yield "star", lines(30, rng.normal(size=(6, 3)))
+    yield "circle", np.column_stack([np.cos(turn), np.sin(turn), 0 * turn])
+    yield "plane", grid(12, 12, 1)
+    yield "block", grid(6, 6, 6)
+    yield "clumps", np.concatenate([1000 * rng.normal(size=3) + 1e-3 * rng.normal(size=(40, 3)) for _ in range(4)])
+    yield "ball", rng.normal(size=(60, 3))
+    yield "dust", rng.normal(size=(12, 3))
+    for name in ("two_rings", "torus", "y_junction", "sheet", "tree"):
+        yield name, getattr(samples, name)(120).points
+
+
+def spoilt(points, how, rng):
+    size = np.ptp(points, axis=0).max()
+    return {
+        "as they are": points,
+        "copies": np.concatenate([points + 1e-10 * size * rng.normal(size=points.shape) for _ in range(5)]),
+        "flat": points * [1, 1, 0],
+        "on a grid": np.rint(points / size * 12),
+        "far ones": np.concatenate([points, points[:1] + 1e3 * size * rng.normal(size=(3, 3))]),
+        "twice, once small": np.concatenate([points, 1e-3 * points[:, [1, 2, 0]]]),
+        "tiny": 1e-30 * points,
+    }[how]
+
+
+def check_finite(what, where):
+    for name, value in vars(what).items():
+        if isinstance(value, np.ndarray) and value.dtype.kind == "f" and name not in UNKNOWN:
+            if name == "confidence" and where in BEFORE_A_FIT:
+                continue
+            assert np.isfinite(value).all(), f"{name} after {where}"
+
+
+def run(cloud, stages):
+    data = cloud
+    try:
+        for stage in stages:
+            data = stage.run(data, None)
+            check_finite(data, type(stage).__name__)
+    except InvalidCloudError:  # of too few places
+        return None
+    return data
+
+
+@pytest.fixture
+def watched(monkeypatch):
+    """Every step of the Refiner is looked at, and nothing divides by zero or overflows on the way."""
+
+    def looked_at(name, step):
+        def look(*given, **options):
+            made = step(*given, **options)
+            skeleton, decisions = made if isinstance(made, tuple) else (made, [])
+            check_finite(skeleton, name)
+            assert np.isfinite([(each.probability, *each.place) for each in decisions]).all(), name
+            return made
+
+        return look
+
+    for name in STEPS:
+        monkeypatch.setattr(refiner, name, looked_at(name, getattr(refiner, name)))
+    for about, step in refiner.ANSWERS.items():
+        monkeypatch.setitem(refiner.ANSWERS, about, looked_at(about, step))
+    with np.errstate(divide="raise", over="raise", invalid="raise"):
+        yield
+
+
+HOW = ("as they are", "copies", "flat", "on a grid", "far ones", "twice, once small", "tiny")
+
+
+@pytest.mark.parametrize("how", HOW)
+def test_numbers_of_degenerate_clouds_are_finite(watched, how):
+    done = 0
+    for (name, points), pipeline in product(clouds(), (pipelines.default(), pipelines.tree())):
+        cloud = spoilt(points, how, np.random.default_rng(len(name)))
+        skeleton = run(cloud, pipeline.stages)
+        done += isinstance(skeleton, Skeleton)
+        if skeleton is not None:
+            assert (skeleton.radii >= 0).all()
+            check_finite(Tracer(root="z").run(skeleton, None), "Tracer")
+    assert done >= 18
+
+
+@pytest.mark.parametrize("seed", [3, 7])
+def test_a_junction_without_points_near(watched, seed):
+    """Copies of few points that hardly differ: bridges lead through places from which all points are very far away."""
+    ring, rng = samples.two_rings(250).points, np.random.default_rng(seed)
+    copies = np.tile(ring, (5, 1))
+    assert run(copies + 1e-10 * rng.normal(size=copies.shape), pipelines.default().stages) is not None
+
+
+@pytest.mark.parametrize("away", [0.0, 1.0, 37.0, 38.5, 50.0, 1e6])
+@pytest.mark.parametrize("radius", [0.0, 1e-200, 1e-3])
+def test_where_lines_meet_without_a_surface(away, radius):
+    """Points that are far away have no say: what is left are the lines."""
+    ways = np.eye(3)
+    limbs = [Line(-3.0 * way, way, 1.0, 0.0, 0.0, -1.0 * way[None], 1e-3) for way in ways]
+    points = away * 1e-3 * np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]) + [0, 0, 1e-4]
+    with np.errstate(divide="raise", over="raise", invalid="raise"):
+        place, touching = meet(limbs, np.full(3, 1e-4), radius, points, ways)
+    assert np.isfinite([*place, touching]).all()
+    if away > 38 or radius < 1e-3:
+        np.testing.assert_allclose(place, 0, atol=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_clumps_on_a_line_have_a_spacing(watched, seed):
+    """The least variance of their surroundings is a difference that rounding may leave below 0."""
+    rng = np.random.default_rng(2 * seed + 30)
+    points = np.concatenate([1000 * rng.normal(size=3) + 1e-3 * rng.normal(size=(350, 3)) for _ in range(4)])
+    points = np.concatenate([points, 1e-3 * points[:, [1, 2, 0]]]) * [1, 0, 1e-9]
+    assert run(points, pipelines.rings().stages) is not None
