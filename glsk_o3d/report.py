@@ -138,7 +138,8 @@ class Report:
     n_traced : int
         Input points without a surface, whose parts were traced along shortest paths.
     joined : tuple of ((x, y, z), (x, y, z))
-        Ends of the gaps joined there, or to make one tree, in the cloud's units.
+        Ends, in the cloud's units, of what no point supports: bridges, handles led through a bowl, paths that meet, and
+        gaps joined between pieces without a surface, or to make one tree.
     root : (x, y, z) or ()
         The root of a tree; empty without one.
     decisions : tuple of Decision
