@@ -9,7 +9,7 @@ from ..errors import InvalidParameterError
 from ..numerics.groups import Members
 from ..numerics.neighbourhoods import plane_axes
 from ..numerics.polylines import arc_lengths, place_at, relative_distance
-from ..numerics.vectors import AXES, TINY, Floats, along_axis, norm
+from ..numerics.vectors import AXES, Floats, along_axis, norm
 from ..numerics.vectors import unit as directions
 from .branches import branch_table
 from .rows import Rows
@@ -159,8 +159,7 @@ def upward(skeleton: Any, root: Any, up: str | None) -> str:
 def points_near(skeleton: Any) -> np.ndarray:
     """Rows of the points no farther from their vertex than three radii and the longest edge there."""
     owner, longest = skeleton.vertex_of_point, np.zeros(len(skeleton.vertices))
-    for ends in skeleton.edges.T:
-        np.maximum.at(longest, ends, skeleton.edge_lengths)
+    np.maximum.at(longest, skeleton.edges, skeleton.edge_lengths[:, None])
     some = np.flatnonzero(owner >= 0)
     away = norm(skeleton.points[some] - skeleton.vertices[owner[some]])
     return some[away <= (OUTSIDE * skeleton.radii + longest)[owner[some]]]
@@ -241,9 +240,6 @@ def _beyond_tips(skeleton: Any) -> dict[int, float]:
 
 def _place_beyond(curve: np.ndarray, along: np.ndarray, lengths: np.ndarray) -> np.ndarray:
     """The places so far along a curve, which goes straight on at both ends."""
-    places = place_at(curve, along, lengths)
-    for end, beside, more in ((0, 1, -lengths), (-1, -2, lengths - along[-1])):
-        way = curve[end] - curve[beside]
-        unit = way / max(float(np.linalg.norm(way)), TINY)
-        places = places + np.maximum(more, 0)[:, None] * unit
-    return places
+    before, behind = directions(curve[[0, -1]] - curve[[1, -2]])
+    places = place_at(curve, along, lengths) + np.maximum(-lengths, 0)[:, None] * before
+    return places + np.maximum(lengths - along[-1], 0)[:, None] * behind
