@@ -110,7 +110,7 @@ class Refiner(Filter[Skeleton]):
         if not self.recentre:
             return in_order(self._refined, given)  # every point keeps its vertex
         refined = on_sample(lambda skeleton: in_order(self._refined, skeleton), given)
-        return without_strays(refined) if self.air else refined
+        return without_strays(refined) if self.air and self.bridge else refined
 
     def _refined(self, skeleton: Skeleton) -> Skeleton:
         skeleton, surface = self._fit(skeleton)
