@@ -1,6 +1,6 @@
 """OutlierRemover: points -> those that are no outliers, single points far from all others or clusters that float."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from .numerics.frame import MIN_POINTS
 from .numerics.groups import component_labels
 from .numerics.neighbourhoods import local_outlier_ratio, mean_distances, nearest_neighbours, principal, row_medians
+from .numerics.vectors import TINY
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .points import Points
@@ -18,6 +19,7 @@ DENSEST_HOPS = 4  # from neighbour to neighbour, within which the densest place 
 FLOATING_RATIO = 5.0  # times as far from its neighbours as points there are: not for a surface that is only uneven
 FLOATING_SHARE = 0.1  # of all points that can float at most; more are a part of the object
 LIMB_NEIGHBOURS = 64  # among points far from theirs, that a limb of an object is longer than thick with
+MIXED_SHARE = 0.01  # of all points that surely are mixed pixels, at least; fewer are ends and seams of a scan
 # least second and third over first principal spread of points that fill space
 FILLED_SECOND, FILLED_THIRD = 0.35, 0.1
 
@@ -57,19 +59,27 @@ class OutlierRemover(Filter[Points]):
         if not self.outlier_factor:
             return points
         points.check_whole(self)
-        cloud, neighbours = points.cloud, points.neighbours
-        left, neighbours = inliers(cloud, points.weight, neighbours, self.outlier_factor, MIN_POINTS)
+        mixed = mixed_pixels(points, self.outlier_factor)
+        left, neighbours = inliers(
+            points.cloud, points.weight, points.neighbours, self.outlier_factor, MIN_POINTS, mixed
+        )
         if len(left) == len(points):
             return points
         gone = np.ones(len(points), bool)
         gone[left] = False
-        return points.without(gone, neighbours)
+        rest = points.without(gone, neighbours)
+        return replace(rest, report=replace(rest.report, n_mixed=int(mixed.sum())))
 
 
 def inliers(
-    points: np.ndarray, weight: np.ndarray, neighbours: np.ndarray, factor: float, least: int
+    points: np.ndarray,
+    weight: np.ndarray,
+    neighbours: np.ndarray,
+    factor: float,
+    least: int,
+    mixed: np.ndarray | bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The points left when those far from all others are set aside, round by round.
+    """The points left when those far from all others are set aside, round by round, the `mixed` (n,) in the first.
 
     An outlier is `factor` times farther from its neighbours than these are from theirs. Where there are many, its
     neighbours are outliers, too; then what floats in space goes, see `in_floating_cluster`. At least `least` points are
@@ -79,19 +89,46 @@ def inliers(
     for _ in range(OUTLIER_ROUNDS):
         # as near as the neighbours would be if all were there
         mean = distance / np.sqrt(weight[left].take(neighbours).mean(axis=1))
-        found = local_outlier_ratio(mean, neighbours) > factor
+        found = (local_outlier_ratio(mean, neighbours) > factor) | mixed
         if mean.max() > FLOATING_RATIO * mean.min():  # else none can float
             found |= in_floating_cluster(points[left], weight[left], mean, neighbours)
         keep = np.flatnonzero(~found)
         if len(keep) == len(left) or len(keep) < least:
             break
-        left, index = left[keep], np.cumsum(~found) - 1
+        left, index, mixed = left[keep], np.cumsum(~found) - 1, False
         k = min(neighbours.shape[1], len(left))
         changed = np.flatnonzero(found[neighbours[keep]].any(axis=1))
         distance, neighbours, there = distance[keep], index[neighbours[keep, :k]], points[left]
         near, neighbours[changed] = nearest_neighbours(there, k, of=there[changed])
         distance[changed] = near[:, 1:].mean(axis=1)
     return left, neighbours
+
+
+def mixed_pixels(points: Points, factor: float) -> np.ndarray:
+    """Points that hang between the edge of a surface and what a camera saw behind it, (n,) bool array.
+
+    A pixel on an edge has a depth between front and back. Such points are sparse beside a surface a few steps away,
+    and in none of their own, since their neighbourhoods are thick: with the ratio r of their distances to the spacing
+    of the surface, and neighbourhoods t times as thick as wide, ``r^2 sqrt(t) > factor``. There are some only where
+    more than a few are so by far, with ``r sqrt(t) > factor``. Where little of a cloud is a surface, sparse points are
+    twigs.
+    """
+    weight, (third, second, first) = points.weight, points.spread.T
+    flat = (third < FILLED_THIRD * second) & (second > FILLED_SECOND * first)
+    found, all_ = np.zeros(len(points), bool), weight.sum()
+    if weight[flat].sum() < 2 * FLOATING_SHARE * all_:
+        return found
+    mean = mean_distances(points.cloud, points.neighbours) / np.sqrt(weight.take(points.neighbours).mean(axis=1))
+    thick = mean * (third / np.maximum(second, TINY)) ** 0.25
+    densest = np.where(flat, mean, np.inf)
+    if weight[thick > factor * densest.min()].sum() < MIXED_SHARE * all_:
+        return found
+    each = np.ascontiguousarray(points.neighbours.T)
+    for _ in range(DENSEST_HOPS + 1):
+        densest = densest.take(each).min(axis=0)
+    if weight[thick > factor * densest].sum() > MIXED_SHARE * all_:
+        found = thick > np.sqrt(factor) * densest
+    return found & (weight[found].sum() < FLOATING_SHARE * all_)
 
 
 def in_floating_cluster(points: np.ndarray, weight: np.ndarray, mean: np.ndarray, neighbours: np.ndarray) -> np.ndarray:

@@ -173,6 +173,7 @@ class Report:
     n_by_area: int = 0
     n_sampled: int = 0
     n_outliers: int = 0
+    n_mixed: int = 0
     n_distinct: int = 0
     n_contracted: int = 0
     noise: float = 0.0

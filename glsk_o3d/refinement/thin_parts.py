@@ -97,6 +97,8 @@ def without_strays(skeleton: Skeleton) -> Skeleton:
 
 def may_lack_surface(skeleton: Skeleton, least: float) -> bool:
     """Whether vertices that are not sure where the axis is have so many points that one region may lack a surface."""
+    if skeleton.report.n_mixed:  # then a part thinner than a pixel would be nothing but mixed pixels
+        return False
     owner, m = skeleton.vertex_of_point[skeleton.vertex_of_point >= 0], len(skeleton.vertices)
     count = np.bincount(owner, minlength=m) / max(len(owner) / SAMPLED_POINTS, 1)
     return bool(count[skeleton.confidence < UNSURE_CONFIDENCE].sum() > (1 - least) * min(REGION_POINTS, count.sum()))
