@@ -14,12 +14,11 @@ from .pipeline import Filter, Watch
 from .points import Points
 
 # All fitted, on clouds with outliers of 1 to 10 %, sparse limbs and crowns.
-OUTLIER_ROUNDS = 6  # since what is left of a cluster stands out once the rest is gone
 DENSEST_HOPS = 4  # from neighbour to neighbour, within which the densest place is looked for
 FLOATING_RATIO = 5.0  # times as far from its neighbours as points there are: not for a surface that is only uneven
 FLOATING_SHARE = 0.1  # of all points that can float at most; more are a part of the object
 LIMB_NEIGHBOURS = 64  # among points far from theirs, that a limb of an object is longer than thick with
-MIXED_SHARE = 0.01  # of all points that surely are mixed pixels, at least; fewer are ends and seams of a scan
+MIXED_SHARE = 0.01  # of all points that surely are mixed pixels if there are any; fewer are at ends of a scan
 # least second and third over first principal spread of points that fill space
 FILLED_SECOND, FILLED_THIRD = 0.35, 0.1
 
@@ -86,7 +85,7 @@ def inliers(
     left. Returned are their rows (m,), ascending, and their nearest neighbours among those left, (m, k).
     """
     left, distance = np.arange(len(points)), mean_distances(points, neighbours)
-    for _ in range(OUTLIER_ROUNDS):
+    while True:  # what is left of a cluster stands out once the rest is gone
         # as near as the neighbours would be if all were there
         mean = distance / np.sqrt(weight[left].take(neighbours).mean(axis=1))
         found = (local_outlier_ratio(mean, neighbours) > factor) | mixed
@@ -113,22 +112,22 @@ def mixed_pixels(points: Points, factor: float) -> np.ndarray:
     more than a few are so by far, with ``r sqrt(t) > factor``. Where little of a cloud is a surface, sparse points are
     twigs.
     """
-    weight, (third, second, first) = points.weight, points.spread.T
+    near, (third, second, first) = points.neighbours, points.spread.T
     flat = (third < FILLED_THIRD * second) & (second > FILLED_SECOND * first)
-    found, all_ = np.zeros(len(points), bool), weight.sum()
-    if weight[flat].sum() < 2 * FLOATING_SHARE * all_:
-        return found
-    mean = mean_distances(points.cloud, points.neighbours) / np.sqrt(weight.take(points.neighbours).mean(axis=1))
-    thick = mean * (third / np.maximum(second, TINY)) ** 0.25
-    densest = np.where(flat, mean, np.inf)
-    if weight[thick > factor * densest.min()].sum() < MIXED_SHARE * all_:
-        return found
-    each = np.ascontiguousarray(points.neighbours.T)
+    none, few = np.zeros(len(points), bool), max(MIXED_SHARE * len(points), 2 * near.shape[1])
+    if np.count_nonzero(flat) < 2 * FLOATING_SHARE * len(points):
+        return none
+    mean = mean_distances(points.cloud, near) / np.sqrt(points.weight.take(near).mean(axis=1))
+    thick, densest = mean * (third / np.maximum(second, TINY)) ** 0.25, np.where(flat, mean, np.inf)
+    if np.count_nonzero(thick > factor * densest.min()) <= few:  # as of most clouds
+        return none
+    each = np.ascontiguousarray(near.T)
     for _ in range(DENSEST_HOPS + 1):
         densest = densest.take(each).min(axis=0)
-    if weight[thick > factor * densest].sum() > MIXED_SHARE * all_:
-        found = thick > np.sqrt(factor) * densest
-    return found & (weight[found].sum() < FLOATING_SHARE * all_)
+    if np.count_nonzero(thick > factor * densest) <= few:
+        return none
+    found = thick > np.sqrt(factor) * densest
+    return found if np.count_nonzero(found) < FLOATING_SHARE * len(points) else none
 
 
 def in_floating_cluster(points: np.ndarray, weight: np.ndarray, mean: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
