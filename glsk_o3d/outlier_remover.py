@@ -28,7 +28,8 @@ FILLED_SECOND, FILLED_THIRD = 0.35, 0.1
 class OutlierRemover(Filter[Points]):
     """Set outliers aside: later filters ignore them, but each belongs to the vertex of the nearest point.
 
-    An outlier is far from its neighbours, relative to their spacing, or in a small isolated cluster. Do not call
+    An outlier is far from its neighbours, relative to their spacing, in a small isolated cluster, or a mixed pixel of a
+    depth camera, between the edge of a surface and what is behind it. Do not call
     Open3D's ``remove_statistical_outlier`` first: it also removes points of sparse limbs.
 
     References

@@ -127,10 +127,10 @@ class Report:
 
     Attributes
     ----------
-    n_input, n_dropped, n_by_area, n_sampled, n_outliers, n_distinct, n_contracted : int
+    n_input, n_dropped, n_by_area, n_sampled, n_outliers, n_mixed, n_distinct, n_contracted : int
         Numbers of input points, points dropped as not finite, points by area that stand for a mesh (0 if its vertices
-        do), points of the sample of a large cloud (all of a small one), outliers, distinct points of the sample, and
-        contracted points.
+        do), points of the sample of a large cloud (all of a small one), outliers, those of them that are mixed pixels,
+        distinct points of the sample, and contracted points.
     noise : float
         Mean share of noise of the neighbourhoods, from 0 to 1.
     n_loops_closed, n_cuts, n_bridges : int

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from glsk_o3d import OutlierRemover, RingBuilder, Sampler, samples
+from glsk_o3d import OutlierRemover, RingBuilder, Sampler, samples, skeletonize
 from glsk_o3d.numerics.grid_sampling import sample_grid
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
 from glsk_o3d.outlier_remover import inliers
@@ -112,3 +112,57 @@ def test_what_is_left_is_the_cloud_without_them(outliers):
     # outliers go with the nearest point that is none
     nearest = cKDTree(TORUS).query(mixed[~kept])[1]
     np.testing.assert_array_equal(state.representative_of_point[~kept], clean.representative_of_point[nearest])
+
+
+# ---- mixed pixels of a depth camera
+
+
+def veiled(points, share, seed=0, reach=0.3, across=0.01):
+    """A cloud seen from above, and after it mixed pixels: a veil below its outline, down to the ground."""
+    rng = np.random.default_rng(seed)
+    hull = points[np.argsort(-np.linalg.norm(points[:, :2], axis=1))[: len(points) // 8]]  # near the outer outline
+    veil = hull[rng.choice(len(hull), round(share * len(points)), replace=False)].copy()
+    veil[:, :2] += rng.normal(0, across, (len(veil), 2))
+    veil[:, 2] -= rng.uniform(0.12, 0.12 + reach, len(veil))
+    return np.concatenate([points, veil])
+
+
+RING = samples.torus(4000, ring_radius=0.4, radius=0.1).points
+
+
+@pytest.mark.parametrize("share", [0.03, 0.05, 0.08])
+def test_a_veil_of_mixed_pixels_goes(share):
+    points = veiled(RING, share)
+    state = STRICT(points)
+    assert state.report.n_mixed > 0
+    assert state.outlier[4000:].mean() > 0.85
+    assert state.outlier[:4000].mean() < 0.01
+
+
+def test_a_few_mixed_pixels_are_asked_for_by_their_neighbours_alone():
+    points = veiled(RING, 0.004)
+    state = STRICT(points)
+    assert state.report.n_mixed == 0
+    assert not state.outlier[:4000].any()
+
+
+def test_twigs_and_noise_are_no_mixed_pixels():
+    """Where little of a cloud is a surface, sparse points are parts of it."""
+    for shape in (samples.tree(4096, forks=6, seed=1), samples.torus(4000, noise=0.03)):
+        assert STRICT(shape.points).report.n_mixed == 0
+
+
+def test_thin_wires_on_a_body_stay():
+    """As dense along them as the surface of the body, with which no camera sees less."""
+    body = samples.torus(6000, ring_radius=0.4, radius=0.1).points
+    along = np.linspace(0, 0.5, 60)
+    wires = np.concatenate([[0.5 * np.cos(a), 0.5 * np.sin(a), 0] + np.outer(along, [0, 0, 1]) for a in range(6)])
+    points = np.concatenate([body, wires + np.random.default_rng(0).normal(0, 0.002, wires.shape)])
+    assert not STRICT(points).outlier[6000:].any()
+
+
+def test_no_hairs_grow_in_a_veil():
+    """A ring of a few points across, as legs and frames are: its veil was traced."""
+    ring = samples.torus(1500, ring_radius=0.5, radius=0.02).points
+    found = skeletonize(veiled(ring, 0.07, reach=0.15, across=0.02))
+    assert (found.n_components, found.n_loops, len(found.leaves), found.report.n_traced) == (1, 1, 0, 0)

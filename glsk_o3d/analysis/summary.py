@@ -32,6 +32,7 @@ def summary(skeleton: Skeleton, seconds: float) -> dict[str, Any]:
         "by_area": report.n_by_area,
         "sampled": report.n_sampled,
         "outliers": report.n_outliers,
+        "mixed": report.n_mixed,
         "distinct": report.n_distinct,
         "contracted": report.n_contracted,
         **structure(skeleton),
