@@ -59,16 +59,15 @@ class OutlierRemover(Filter[Points]):
         if not self.outlier_factor:
             return points
         points.check_whole(self)
-        mixed = mixed_pixels(points, self.outlier_factor)
-        left, neighbours = inliers(
-            points.cloud, points.weight, points.neighbours, self.outlier_factor, MIN_POINTS, mixed
+        left, neighbours, n_mixed = inliers(
+            points.cloud, points.weight, points.neighbours, self.outlier_factor, MIN_POINTS, points.spread
         )
         if len(left) == len(points):
             return points
         gone = np.ones(len(points), bool)
         gone[left] = False
         rest = points.without(gone, neighbours)
-        return replace(rest, report=replace(rest.report, n_mixed=int(mixed.sum())))
+        return replace(rest, report=replace(rest.report, n_mixed=n_mixed))
 
 
 def inliers(
@@ -77,34 +76,38 @@ def inliers(
     neighbours: np.ndarray,
     factor: float,
     least: int,
-    mixed: np.ndarray | bool = False,
-) -> tuple[np.ndarray, np.ndarray]:
-    """The points left when those far from all others are set aside, round by round, the `mixed` (n,) in the first.
+    spread: np.ndarray | None = None,
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """The points left when those far from all others are set aside, round by round.
 
     An outlier is `factor` times farther from its neighbours than these are from theirs. Where there are many, its
     neighbours are outliers, too; then what floats in space goes, see `in_floating_cluster`. At least `least` points are
-    left. Returned are their rows (m,), ascending, and their nearest neighbours among those left, (m, k).
+    left. Returned are their rows (m,), ascending, their nearest neighbours among those left, (m, k), and the number of
+    mixed pixels, which go in the first round if the `spread` (n, 3) of the neighbourhoods is known.
     """
-    left, distance = np.arange(len(points)), mean_distances(points, neighbours)
+    left, distance, n_mixed = np.arange(len(points)), mean_distances(points, neighbours), 0
     while True:  # what is left of a cluster stands out once the rest is gone
         # as near as the neighbours would be if all were there
         mean = distance / np.sqrt(weight[left].take(neighbours).mean(axis=1))
-        found = (local_outlier_ratio(mean, neighbours) > factor) | mixed
+        found = local_outlier_ratio(mean, neighbours) > factor
+        if spread is not None:
+            mixed, spread = mixed_pixels(mean, neighbours, spread, factor), None
+            found, n_mixed = found | mixed, int(mixed.sum())
         if mean.max() > FLOATING_RATIO * mean.min():  # else none can float
             found |= in_floating_cluster(points[left], weight[left], mean, neighbours)
         keep = np.flatnonzero(~found)
         if len(keep) == len(left) or len(keep) < least:
             break
-        left, index, mixed = left[keep], np.cumsum(~found) - 1, False
+        left, index = left[keep], np.cumsum(~found) - 1
         k = min(neighbours.shape[1], len(left))
         changed = np.flatnonzero(found[neighbours[keep]].any(axis=1))
         distance, neighbours, there = distance[keep], index[neighbours[keep, :k]], points[left]
         near, neighbours[changed] = nearest_neighbours(there, k, of=there[changed])
         distance[changed] = near[:, 1:].mean(axis=1)
-    return left, neighbours
+    return left, neighbours, n_mixed
 
 
-def mixed_pixels(points: Points, factor: float) -> np.ndarray:
+def mixed_pixels(mean: np.ndarray, neighbours: np.ndarray, spread: np.ndarray, factor: float) -> np.ndarray:
     """Points that hang between the edge of a surface and what a camera saw behind it, (n,) bool array.
 
     A pixel on an edge has a depth between front and back. Such points are sparse beside a surface a few steps away,
@@ -113,22 +116,22 @@ def mixed_pixels(points: Points, factor: float) -> np.ndarray:
     more than a few are so by far, with ``r sqrt(t) > factor``. Where little of a cloud is a surface, sparse points are
     twigs.
     """
-    near, (third, second, first) = points.neighbours, points.spread.T
+    n, (third, second, first) = len(mean), spread.T
     flat = (third < FILLED_THIRD * second) & (second > FILLED_SECOND * first)
-    none, few = np.zeros(len(points), bool), max(MIXED_SHARE * len(points), 2 * near.shape[1])
-    if np.count_nonzero(flat) < 2 * FLOATING_SHARE * len(points):
+    none, few = np.zeros(n, bool), max(MIXED_SHARE * n, 2 * neighbours.shape[1])
+    if np.count_nonzero(flat) < 2 * FLOATING_SHARE * n:
         return none
-    mean = mean_distances(points.cloud, near) / np.sqrt(points.weight.take(near).mean(axis=1))
-    thick, densest = mean * (third / np.maximum(second, TINY)) ** 0.25, np.where(flat, mean, np.inf)
-    if np.count_nonzero(thick > factor * densest.min()) <= few:  # as of most clouds
+    thick = mean * np.sqrt(np.sqrt(third / np.maximum(second, TINY)))
+    densest = np.where(flat, mean, np.inf)
+    if np.count_nonzero(thick > factor * densest.min()) <= few:  # as in most clouds
         return none
-    each = np.ascontiguousarray(near.T)
+    each = np.ascontiguousarray(neighbours.T)
     for _ in range(DENSEST_HOPS + 1):
         densest = densest.take(each).min(axis=0)
     if np.count_nonzero(thick > factor * densest) <= few:
         return none
     found = thick > np.sqrt(factor) * densest
-    return found if np.count_nonzero(found) < FLOATING_SHARE * len(points) else none
+    return found if np.count_nonzero(found) < FLOATING_SHARE * n else none
 
 
 def in_floating_cluster(points: np.ndarray, weight: np.ndarray, mean: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
