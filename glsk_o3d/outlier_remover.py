@@ -14,6 +14,7 @@ from .pipeline import Filter, Watch
 from .points import Points
 
 # All fitted, on clouds with outliers of 1 to 10 %, sparse limbs and crowns.
+MOST_ROUNDS = 20  # speed: clouds need less than ten, but spirals that get ever sparser one for every point
 DENSEST_HOPS = 4  # from neighbour to neighbour, within which the densest place is looked for
 FLOATING_RATIO = 5.0  # times as far from its neighbours as points there are: not for a surface that is only uneven
 FLOATING_SHARE = 0.1  # of all points that can float at most; more are a part of the object
@@ -86,7 +87,7 @@ def inliers(
     mixed pixels, which go in the first round if the `spread` (n, 3) of the neighbourhoods is known.
     """
     left, distance, n_mixed = np.arange(len(points)), mean_distances(points, neighbours), 0
-    while True:  # what is left of a cluster stands out once the rest is gone
+    for _ in range(MOST_ROUNDS):  # what is left of a cluster stands out once the rest is gone
         # as near as the neighbours would be if all were there
         mean = distance / np.sqrt(weight[left].take(neighbours).mean(axis=1))
         found = local_outlier_ratio(mean, neighbours) > factor
