@@ -1,5 +1,7 @@
 """Close loops that nothing passes through."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np
@@ -11,15 +13,18 @@ from ..numerics.groups import component_labels, group_rank, quantile
 from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import TINY
 from ..skeleton import Skeleton
+from .diagnostics import MAJORITY
 from .evidence import LEAST_INSIDE, Evidence
 from .merging import collapse_triangles, drop_edges, merge_vertices
 from .sections import VertexPoints
+from .thin_parts import UNSURE_CONFIDENCE
 
 WIDE_LOOP = 1.4  # fitted: surface distances, the radius of a loop that is more than two strands in one part
 WIDE_OPEN = 6.0  # fitted: spacings, its radius beyond which that says no more: crowns have wide false loops
 CLEAR_SIGHT = 3.0  # fitted: spacings, the radius of what one sees through it beyond which that says no more
 LOOP_GRID = 15  # precision: of a grid across a loop, either way
 WIDEST_FIRST = 8  # speed: places in a loop, with the widest sight, whose winding numbers are asked before others
+WIRES_ON_LOOPS = 0.9  # fitted: share of what has no surface that is on wide loops in a frame of wires; in crowns .8
 WALL_SECTORS = 16  # precision: directions around a place in which walls are looked for
 
 
@@ -37,7 +42,8 @@ def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
         fresh = {name: cycle for name, cycle in zip(names, cycles, strict=True) if name not in known}
         known.update(zip(fresh, loop_facts(skeleton, [*fresh.values()], evidence), strict=True))
         kept, narrow, cut, used = list[Decision](), [], [], set[int]()
-        for cycle, loop in zip(cycles, (known[name] for name in names), strict=True):
+        loops = [known[name] for name in names]
+        for cycle, loop in zip(cycles, _judged(skeleton, cycles, loops), strict=True):
             false = loop.probability < least
             where = tuple(loop.centre.tolist())
             (decisions if false else kept).append(Decision("loop", where, loop.probability, false))
@@ -71,6 +77,23 @@ class LoopEvidence(NamedTuple):
     def probability(self) -> float:
         """That it is one: what the facts say, and less where it has little inside, nothing as in sparse crowns."""
         return QUESTIONS["loop"].probability(self.facts) * float(np.clip(2 * self.inside / LEAST_INSIDE - 1, 0, 1))
+
+    def without_normals(self) -> LoopEvidence:
+        """The same with as many bonds and as much inside as speak for nothing."""
+        return self._replace(facts=self.facts | dict(bonds=float(np.log(1.1))), inside=LEAST_INSIDE)
+
+
+def _judged(skeleton: Skeleton, cycles: list[np.ndarray], loops: list[LoopEvidence]) -> list[LoopEvidence]:
+    """The evidence for some loops; in a frame of wires without what normals say, where there is no surface.
+
+    That is what has no surface, most of the skeleton, and is nearly all on wide loops: in a crown there are ends.
+    """
+    thin, wide = skeleton.confidence < UNSURE_CONFIDENCE, np.zeros(len(skeleton.vertices), bool)
+    for cycle, loop in zip(cycles, loops, strict=True):
+        wide[cycle] |= not loop.is_narrow
+    if thin.mean() <= MAJORITY or thin[wide].sum() <= WIRES_ON_LOOPS * thin.sum():
+        return loops
+    return [loop.without_normals() if thin[cycle].mean() > MAJORITY else loop for cycle, loop in zip(cycles, loops, strict=True)]
 
 
 def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> list[LoopEvidence]:
