@@ -20,10 +20,9 @@ from .numerics.pairing import Pairs, merge_pairs
 from .numerics.vectors import PAIRS
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
-from .points import Points, default_k
+from .points import RIDGE_NEIGHBOURS, Points, default_k
 from .refinement.evidence import ENOUGH_POINTS
 
-RIDGE_NEIGHBOURS = 32  # fitted: among which a ridge is sought: more than for rings, a noisy shell is thick
 RIDGE_CHUNK = 1024  # speed: points at a time: the (3, points, 32) work arrays then stay in the cache
 MOST_IN_ONE = 4  # fitted: noisy points that are averaged in a pass
 MERGE_WORTH = 0.01  # fitted: share of the points that another round of a pass must merge

@@ -23,6 +23,7 @@ Some = TypeVar("Some", bound="Representatives")
 
 # Fitted: median sphericity of clean neighbourhoods at most, and of nothing but noise.
 CLEAN_SPHERICITY, NOISE_SPHERICITY = 0.2, 0.35
+RIDGE_NEIGHBOURS = 32  # fitted: among which a ridge is sought: more than for rings, a noisy shell is thick
 
 ENOUGH = 2400  # fitted: points on a body without thin parts; fewer are not thinned
 MOST_CONTRACTED = 25000  # speed: points of most clouds that are contracted

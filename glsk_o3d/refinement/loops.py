@@ -17,7 +17,7 @@ from .diagnostics import MAJORITY
 from .evidence import LEAST_INSIDE, Evidence
 from .merging import collapse_triangles, drop_edges, merge_vertices
 from .sections import VertexPoints
-from .thin_parts import UNSURE_CONFIDENCE
+from .thin_parts import UNSURE_CONFIDENCE, SpacedPoints
 
 WIDE_LOOP = 1.4  # fitted: surface distances, the radius of a loop that is more than two strands in one part
 WIDE_OPEN = 6.0  # fitted: spacings, its radius beyond which that says no more: crowns have wide false loops
@@ -79,21 +79,25 @@ class LoopEvidence(NamedTuple):
         return QUESTIONS["loop"].probability(self.facts) * float(np.clip(2 * self.inside / LEAST_INSIDE - 1, 0, 1))
 
     def without_normals(self) -> LoopEvidence:
-        """The same with as many bonds and as much inside as speak for nothing."""
-        return self._replace(facts=self.facts | dict(bonds=float(np.log(1.1))), inside=LEAST_INSIDE)
+        """The same with bonds all around, and something inside."""
+        return self._replace(facts=self.facts | dict(bonds=float(np.log(1 + 0.1))), inside=LEAST_INSIDE)
 
 
 def _judged(skeleton: Skeleton, cycles: list[np.ndarray], loops: list[LoopEvidence]) -> list[LoopEvidence]:
     """The evidence for some loops; in a frame of wires without what normals say, where there is no surface.
 
-    That is what has no surface, most of the skeleton, and is nearly all on wide loops: in a crown there are ends.
+    There most of the skeleton has no surface and is on wide loops, unlike a crown, which has ends, and unlike noise.
     """
     thin, wide = skeleton.confidence < UNSURE_CONFIDENCE, np.zeros(len(skeleton.vertices), bool)
     for cycle, loop in zip(cycles, loops, strict=True):
         wide[cycle] |= not loop.is_narrow
     if thin.mean() <= MAJORITY or thin[wide].sum() <= WIRES_ON_LOOPS * thin.sum():
         return loops
-    return [loop.without_normals() if thin[cycle].mean() > MAJORITY else loop for cycle, loop in zip(cycles, loops, strict=True)]
+    cloud = SpacedPoints(skeleton)
+    if cloud.scattered[thin[cloud.vertex]].mean() > MAJORITY:
+        return loops
+    pairs = zip(cycles, loops, strict=True)
+    return [loop.without_normals() if thin[cycle].mean() > MAJORITY else loop for cycle, loop in pairs]
 
 
 def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> list[LoopEvidence]:

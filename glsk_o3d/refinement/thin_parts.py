@@ -11,9 +11,10 @@ from ..numerics.eigen import largest_eigenvalue
 from ..numerics.grid_sampling import SAMPLED_POINTS, sample_cloud
 from ..numerics.groups import component_labels, first_in_their_place, group_sum
 from ..numerics.near_links import link_growth, near_links
-from ..numerics.neighbourhoods import nearest_neighbours
+from ..numerics.neighbourhoods import nearest_neighbours, principal
 from ..numerics.vectors import COLUMNS, ROWS, TINY
 from ..numerics.winding import AREA_NEIGHBOURS
+from ..points import RIDGE_NEIGHBOURS, noise_share
 from ..skeleton import Skeleton
 from .diagnostics import MAJORITY, SHEET_SHARE, STUB_LENGTH
 from .merging import drop_lone_vertices, with_fields
@@ -26,7 +27,7 @@ SHEET_GROWTH = 2.2  # fitted: growth of links that a sheet surely has
 UNSURE_CONFIDENCE = 0.4  # fitted: confidence below which the normals around a vertex do not say where the axis is
 REGION_POINTS = 1200  # fitted: points around a vertex of which a share must show a surface
 REGION_VERTICES = 400  # measured: vertices in which these are looked for
-SURE_CONFIDENCE = 0.6  # fitted: least confidence in a stretch that surely has a surface
+SURE_CONFIDENCE = 1 - UNSURE_CONFIDENCE  # derived: least in a stretch that surely has a surface
 
 
 class SpacedPoints(VertexPoints):
@@ -54,6 +55,12 @@ class SpacedPoints(VertexPoints):
         """Distances to the nearest points, from the point itself to the one that gives the scale."""
         return nearest_neighbours(self.points, min(AREA_NEIGHBOURS + 1, len(self.points)))[0]
 
+    @property
+    def scattered(self) -> np.ndarray:
+        """Whether each of them is one of many that fill space, (n,) bool array, as noise as wide as its part does."""
+        near = nearest_neighbours(self.points, min(RIDGE_NEIGHBOURS, len(self.points)))[1]
+        return noise_share(principal(self.points, near)[0], near) > 0
+
 
 def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
     """Vertices around which the cloud shows no surface, (M,) bool array.
@@ -61,7 +68,8 @@ def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
     There the normals do not agree on an axis. Nor do they in noise; but it fills space, and from link to link there are
     more points than on a surface. Nor do they on a sheet; but there they agree with each other, and there are more
     points than along a curve. One vertex alone is not sure; but where this holds for more than ``1 - least`` of the
-    points of a region, it is so. Where the confidence is unknown there is a surface.
+    points of a region, it is so. Where the confidence is unknown there is a surface. If more than `least` of all these
+    points fill space, they are no twigs, but a part scattered as thick as it is wide, and there are no such vertices.
     """
     skeleton, m = cloud.skeleton, len(cloud.skeleton.vertices)
     thin = skeleton.confidence < UNSURE_CONFIDENCE
@@ -74,7 +82,8 @@ def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
     facts = np.column_stack([link_growth(cloud.links), one_direction(cloud.normals, cloud.links)])
     growth, flat = (group_sum(facts, vertex, m) / np.maximum(count, 1)[:, None]).T
     thin &= growth < np.where(flat < SHEET_SHARE, SURFACE_GROWTH, SHEET_GROWTH)
-    return (_share_around(near, count, thin) > 1 - least) & ~_surely_with_surface(skeleton)
+    thin = (_share_around(near, count, thin) > 1 - least) & ~_surely_with_surface(skeleton)
+    return thin & (not thin.any() or bool(cloud.scattered[thin[vertex]].mean() <= least))
 
 
 def without_strays(skeleton: Skeleton) -> Skeleton:
