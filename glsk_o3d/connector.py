@@ -1,7 +1,7 @@
 """Connector: contracted cloud -> graph (Cao et al. 2010, section 5)."""
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from .parameters import documented, parameter, resolve_length
 from .pipeline import Filter, Watch
 from .skeleton import Skeleton
 from .state import Contraction
+
+LEAST_RADIUS = 1.0  # fitted: of a ball around a vertex, in percent of the diagonal
+RING_WIDTH = 2  # derived: mean edges of a ring across it: nearer vertices would share the points around them
 
 
 @documented
@@ -48,12 +51,14 @@ class Connector(Filter[Skeleton]):
     produces: ClassVar[type] = Skeleton
 
     radius: float | str = parameter(
-        "1%",
-        "Least distance between vertices: smaller details are lost, and parts closer than this fuse.",
+        "auto",
+        "Least distance between vertices: smaller details are lost, and parts closer than this fuse. 'auto' is 1 % of the "
+        "diagonal or, where points are so dense that it is less, the width of a ring.",
         type="length",
         unit="cloud's units, or % of the diagonal",
         low=0,
         open_low=True,
+        choices=("auto",),
     )
     thickness: float = parameter(
         0.6, "Distance between vertices over the local thickness, where that is more; 0 for `radius` alone.", low=0
@@ -65,7 +70,10 @@ class Connector(Filter[Skeleton]):
     )
 
     def _run(self, state: Contraction, watch: Watch | None) -> Skeleton:
-        radius = resolve_length(self.radius, state.frame.diagonal * state.frame.scale) / state.frame.scale
+        given = f"{LEAST_RADIUS}%" if self.radius == "auto" else self.radius
+        radius: Any = resolve_length(given, state.frame.diagonal * state.frame.scale) / state.frame.scale
+        if self.radius == "auto":
+            radius = np.minimum(radius, RING_WIDTH * state.rings.mean_lengths(state.cloud[state.survivors]))
         radii = np.maximum(radius, self.thickness * contraction_distance(state))
         samples, vertex_of_survivor = farthest_point_sampling(state.positions, radii)
         mass = group_sum(state.mass, vertex_of_survivor, len(samples))[:, None]
