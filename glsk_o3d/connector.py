@@ -52,8 +52,8 @@ class Connector(Filter[Skeleton]):
 
     radius: float | str = parameter(
         "auto",
-        "Least distance between vertices: smaller details are lost, and parts closer than this fuse. 'auto' is 1 % of the "
-        "diagonal or, where points are so dense that it is less, the width of a ring.",
+        "Least distance between vertices: smaller details are lost, and parts closer than this fuse. 'auto' is 1 % of "
+        "the diagonal or, where points are so dense that it is less, the width of a ring.",
         type="length",
         unit="cloud's units, or % of the diagonal",
         low=0,
