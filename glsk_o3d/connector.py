@@ -70,9 +70,9 @@ class Connector(Filter[Skeleton]):
     )
 
     def _run(self, state: Contraction, watch: Watch | None) -> Skeleton:
-        given = f"{LEAST_RADIUS}%" if self.radius == "auto" else self.radius
-        radius: Any = resolve_length(given, state.frame.diagonal * state.frame.scale) / state.frame.scale
-        if self.radius == "auto":
+        auto, diagonal = self.radius == "auto", state.frame.diagonal * state.frame.scale
+        radius: Any = resolve_length(f"{LEAST_RADIUS}%" if auto else self.radius, diagonal) / state.frame.scale
+        if auto:
             radius = np.minimum(radius, RING_WIDTH * state.rings.mean_lengths(state.cloud[state.survivors]))
         radii = np.maximum(radius, self.thickness * contraction_distance(state))
         samples, vertex_of_survivor = farthest_point_sampling(state.positions, radii)

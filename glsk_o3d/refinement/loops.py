@@ -84,10 +84,7 @@ class LoopEvidence(NamedTuple):
 
 
 def _judged(skeleton: Skeleton, cycles: list[np.ndarray], loops: list[LoopEvidence]) -> list[LoopEvidence]:
-    """The evidence for some loops; in a frame of wires without what normals say, where there is no surface.
-
-    There most of the skeleton has no surface and is on wide loops, unlike a crown, which has ends, and unlike noise.
-    """
+    """The evidence for loops; without normals where most has no surface and is on wide loops: wires, no crown or noise."""
     thin, wide = skeleton.confidence < UNSURE_CONFIDENCE, np.zeros(len(skeleton.vertices), bool)
     for cycle, loop in zip(cycles, loops, strict=True):
         wide[cycle] |= not loop.is_narrow
