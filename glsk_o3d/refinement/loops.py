@@ -84,7 +84,7 @@ class LoopEvidence(NamedTuple):
 
 
 def _judged(skeleton: Skeleton, cycles: list[np.ndarray], loops: list[LoopEvidence]) -> list[LoopEvidence]:
-    """The evidence for loops; without normals where most has no surface and is on wide loops: wires, no crown or noise."""
+    """The evidence for loops; without normals if most has no surface and is on wide loops: wires, no crown or noise."""
     thin, wide = skeleton.confidence < UNSURE_CONFIDENCE, np.zeros(len(skeleton.vertices), bool)
     for cycle, loop in zip(cycles, loops, strict=True):
         wide[cycle] |= not loop.is_narrow
@@ -93,8 +93,8 @@ def _judged(skeleton: Skeleton, cycles: list[np.ndarray], loops: list[LoopEviden
     cloud = SpacedPoints(skeleton)
     if cloud.scattered[thin[cloud.vertex]].mean() > MAJORITY:
         return loops
-    pairs = zip(cycles, loops, strict=True)
-    return [loop.without_normals() if thin[cycle].mean() > MAJORITY else loop for cycle, loop in pairs]
+    mostly = [thin[cycle].mean() > MAJORITY for cycle in cycles]
+    return [loop.without_normals() if it else loop for it, loop in zip(mostly, loops, strict=True)]
 
 
 def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> list[LoopEvidence]:
