@@ -16,7 +16,7 @@ from .skeleton import Skeleton
 from .state import Contraction
 
 LEAST_RADIUS = 1.0  # fitted: of a ball around a vertex, in percent of the diagonal
-RING_WIDTH = 2  # derived: mean edges of a ring across it: nearer vertices would share the points around them
+RING_WIDTH = 2  # fitted: mean edges of a ring across it: nearer vertices would share the points around them
 
 
 @documented
