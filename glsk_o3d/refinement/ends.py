@@ -24,7 +24,6 @@ END_SIZE = 4.0  # fitted: radii behind the cut over which it is seen how wide a 
 END_REACH = 0.98  # fitted: share of an end's points within its reach: normals and noise throw the others farther
 END_BENDING = 0.5  # fitted: weight of going straight on, twice lambda
 END_ROUNDS = 3  # measured: from then on hardly anything moves
-END_LEFT = 0.25  # fitted: share of a branch from a junction that is left, at least, to say where it leads
 END_POINTS = 4  # derived: fewer cannot say where a limb turns
 END_THINNER = 2 / 3  # measured: over its limb's radius, that of a neck at most; a round cap seems to have .85 of it
 END_SIDES = 1 / 3  # derived: share of the last points that are sides, at least; 2/3 at a flat end, none on its face
@@ -62,7 +61,7 @@ def regrow_ends(skeleton: Skeleton, to_surface: bool = False) -> Skeleton:
     if not len(skeleton.leaves):
         return skeleton
     cloud, sections = VertexPoints(skeleton), measure_sections(skeleton)
-    grown = [found for end in _ends(skeleton) if (found := _grow(cloud, sections, *end, to_surface))]
+    grown = [found for end in _ends(cloud) if (found := _grow(cloud, sections, *end, to_surface))]
     return _replanted(skeleton, grown) if grown else skeleton
 
 
@@ -75,20 +74,24 @@ class _Grown(NamedTuple):
     run: np.ndarray  # vertices behind the cut
 
 
-def _ends(skeleton: Skeleton) -> Iterator[tuple[np.ndarray, int, bool]]:
+def _ends(cloud: VertexPoints) -> Iterator[tuple[np.ndarray, int, bool]]:
     """Every branch that has a leaf, seen towards it, the first vertex that may go, and whether it begins with a leaf.
 
-    The vertex in the middle of a branch with two ends stays, and the junction of another, with a quarter of the branch.
+    The vertex in the middle of a branch with two ends stays. Of another the first vertex out of the part that it grows
+    from stays, which says where it leads; one that does not leave that part is none of them.
     """
+    skeleton = cloud.skeleton
     for branch in skeleton.branches:
         leaf, along = skeleton.degree[branch[[0, -1]]] == 1, arc_lengths(skeleton.vertices[branch])
         if not along[-1] > 0 or (leaf.all() and len(branch) < 3):
             continue
         middle = 1 + np.argmin(np.abs(along[1:-1] - along[-1] / 2)) if leaf.all() else 0
         for path, ends, stays in ((branch[::-1], leaf[0], len(branch) - 1 - middle), (branch, leaf[1], middle)):
-            if ends:
-                short = np.searchsorted(arc_lengths(skeleton.vertices[path]), END_LEFT * along[-1])
-                yield path, int(stays + 1 if leaf.all() else max(short, 1)), bool(leaf.all())
+            if ends and not leaf.all():
+                away = norm(skeleton.vertices[path] - skeleton.vertices[path[0]])
+                stays = np.flatnonzero(away <= cloud.distance[path[0]])[-1] + 1
+            if ends and stays < len(path):
+                yield path, int(stays + 1), bool(leaf.all())
 
 
 def _grow(
@@ -147,7 +150,7 @@ def _last(cloud: VertexPoints, path: np.ndarray, along: np.ndarray, first: int, 
     thick = np.sqrt((cloud.offset[own] ** 2).sum() / max(len(own), 1))
     some = np.cumsum(count[::-1])[::-1] > (1 - END_REACH) * len(own)
     least = np.searchsorted(along, along[-1] - END_CUT * thick)
-    return int(max(np.flatnonzero(some).max(initial=0), least, first))
+    return int(min(max(np.flatnonzero(some).max(initial=0), least, first), len(path) - 1))
 
 
 def _within(along: np.ndarray, stop: float, length: float) -> np.ndarray:

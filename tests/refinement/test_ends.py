@@ -1,5 +1,7 @@
 """Ends go on along their limbs and stop where these do."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -175,3 +177,22 @@ def test_the_radii_of_wide_ends_are_their_own():
     true = np.where(x > 0.62, np.sqrt(np.maximum(0.09 - (x - 0.9) ** 2, 0.01)), 0.1)
     assert x.max() > 1
     assert np.abs(found.radii - true)[x > 0.75].mean() < 0.04  # .1 with the run's
+
+
+@pytest.mark.parametrize(("reach", "stays"), [(0.8, True), (0.3, False)])
+def test_an_end_that_does_not_leave_its_body_stays(reach, stays):
+    """The run behind it lies in the body, of which the junction's points are the surface, and leads nowhere."""
+    points, normals = limb("round")
+    out = points[:, 0] > 0.3
+    skeleton = fork(points[out], normals[out], 0.6, hook=R)
+    body = np.random.default_rng(0).normal(size=(200, 3))
+    body *= reach / np.linalg.norm(body, axis=1, keepdims=True)
+    owner = np.concatenate([skeleton.vertex_of_point, np.zeros(len(body), int)])
+    with_body = replace(
+        skeleton,
+        points=np.concatenate([skeleton.points, body]),
+        normals=np.concatenate([skeleton.normals, body / reach]),
+        vertex_of_point=owner,
+    )
+    grown = regrow_ends(with_body)
+    assert np.array_equal(grown.vertices, with_body.vertices) == stays
