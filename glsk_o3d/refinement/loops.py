@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 from ..decisions import QUESTIONS, Decision
 from ..numerics.cycles import inscribed_circle, minimum_cycle_basis, places_inside
 from ..numerics.groups import component_labels, group_rank, quantile
+from ..numerics.near_links import link_growth
 from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import TINY
 from ..skeleton import Skeleton
@@ -17,7 +18,7 @@ from .diagnostics import MAJORITY
 from .evidence import LEAST_INSIDE, Evidence
 from .merging import collapse_triangles, drop_edges, merge_vertices
 from .sections import VertexPoints
-from .thin_parts import UNSURE_CONFIDENCE, SpacedPoints
+from .thin_parts import SURFACE_GROWTH, UNSURE_CONFIDENCE, SpacedPoints
 
 WIDE_LOOP = 1.4  # fitted: surface distances, the radius of a loop that is more than two strands in one part
 WIDE_OPEN = 6.0  # fitted: spacings, its radius beyond which that says no more: crowns have wide false loops
@@ -35,7 +36,7 @@ def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
     decision for each loop of the minimum cycle bases, closed or left.
     """
     decisions: list[Decision] = []
-    known = dict[bytes, LoopEvidence]()
+    known, wires = dict[bytes, LoopEvidence](), None
     while True:
         cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
         names = [skeleton.vertices[cycle].tobytes() for cycle in cycles]
@@ -43,7 +44,10 @@ def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
         known.update(zip(fresh, loop_facts(skeleton, [*fresh.values()], evidence), strict=True))
         kept, narrow, cut, used = list[Decision](), [], [], set[int]()
         loops = [known[name] for name in names]
-        for cycle, loop in zip(cycles, _judged(skeleton, cycles, loops), strict=True):
+        wires = _is_frame_of_wires(skeleton, cycles, loops) if wires is None else wires
+        for cycle, loop in zip(cycles, loops, strict=True):
+            if wires and (skeleton.confidence[cycle] < UNSURE_CONFIDENCE).mean() > MAJORITY:
+                loop = loop.without_normals()
             false = loop.probability < least
             where = tuple(loop.centre.tolist())
             (decisions if false else kept).append(Decision("loop", where, loop.probability, false))
@@ -83,18 +87,15 @@ class LoopEvidence(NamedTuple):
         return self._replace(facts=self.facts | dict(bonds=float(np.log(1 + 0.1))), inside=LEAST_INSIDE)
 
 
-def _judged(skeleton: Skeleton, cycles: list[np.ndarray], loops: list[LoopEvidence]) -> list[LoopEvidence]:
-    """The evidence for loops; without normals if most has no surface and is on wide loops: wires, no crown or noise."""
+def _is_frame_of_wires(skeleton: Skeleton, cycles: list[np.ndarray], loops: list[LoopEvidence]) -> bool:
+    """Whether most has no surface and is on wide loops, as in no crown, and does not fill space, as noise does."""
     thin, wide = skeleton.confidence < UNSURE_CONFIDENCE, np.zeros(len(skeleton.vertices), bool)
     for cycle, loop in zip(cycles, loops, strict=True):
         wide[cycle] |= not loop.is_narrow
     if thin.mean() <= MAJORITY or thin[wide].sum() <= WIRES_ON_LOOPS * thin.sum():
-        return loops
+        return False
     cloud = SpacedPoints(skeleton)
-    if cloud.scattered[thin[cloud.vertex]].mean() > MAJORITY:
-        return loops
-    mostly = [thin[cycle].mean() > MAJORITY for cycle in cycles]
-    return [loop.without_normals() if it else loop for it, loop in zip(mostly, loops, strict=True)]
+    return bool(np.median(link_growth(cloud.links)[thin[cloud.vertex]]) < SURFACE_GROWTH)
 
 
 def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> list[LoopEvidence]:
