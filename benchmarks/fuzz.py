@@ -190,7 +190,7 @@ def named(runs: Runs = 100, seed: Seed = 0, case: Only = None) -> None:
 def times(
     seed: Seed = 0,
     case: Only = None,
-    sizes: Annotated[str, typer.Option(help="Sizes, with commas.")] = ",".join(map(str, SIZES)),
+    sizes: Annotated[str, typer.Option("--sizes", help="Sizes, with commas.")] = ",".join(map(str, SIZES)),
 ) -> None:
     """Degenerate clouds of every kind and size: none takes more than five times the median CPU time of its size."""
     if case is not None:

@@ -82,7 +82,7 @@ class Connector(Filter[Skeleton]):
         survivor = state.survivor_of_point
         vertex_of_point = np.where(survivor >= 0, vertex_of_survivor[survivor], -1)
         normals = np.full_like(state.points, np.nan)
-        normals[state.sampled] = state.normals[state.representative_of_point[state.sampled]]
+        normals[state.has_normal] = state.normals[state.representative_of_point[state.has_normal]]
         made = Skeleton(
             vertices=vertices,
             edges=self._edges(state, vertex_of_survivor),

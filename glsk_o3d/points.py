@@ -93,6 +93,13 @@ class Representatives:
         first[self.representative_of_point[points]] = points
         return first
 
+    @property
+    def has_normal(self) -> np.ndarray:
+        """Input points with a normal, (N,) bool array: those that determine the surface, and their copies."""
+        if self.report.is_sampled or self.report.n_by_area:
+            return self.sampled
+        return (self.representative_of_point >= 0) & ~self.outlier
+
     def merged_into(self: Some, representative: np.ndarray, **changes: Any) -> Some:
         """The same with survivors merged into others, each into the `representative` (n,) of it; a survivor is its own.
 

@@ -37,7 +37,9 @@ COMMAND_GROUP = "glsk_o3d.commands"
 class Commands(typer.Typer):
     """The commands; what Typer itself prints, such as help, ends in a line, too, where nobody takes it."""
 
-    def __call__(self, *args: Any, **options: Any) -> None:
+    def __call__(self, *args: Any, **options: Any) -> Any:
+        if not options.get("standalone_mode", True):  # in somebody's program
+            return super().__call__(*args, **options)
         try:
             super().__call__(*args, **options)
         except (OSError, SystemExit) as ended:  # SystemExit in the end, and where a pipe is closed

@@ -201,6 +201,7 @@ def on_rows(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton, rows: np.n
         alone = alone[morton_order(skeleton.points[alone])]  # the tree is quicker with what is near in turn
         owner[alone] = made.vertex_of_point[cKDTree(points).query(skeleton.points[alone])[1]]
     owner[others] = owner[stand_ins]
+    normals[others[np.isnan(normals[stand_ins, 0])]] = np.nan
     return with_fields(made, points=skeleton.points, normals=normals, vertex_of_point=owner)
 
 

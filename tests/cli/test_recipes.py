@@ -40,7 +40,7 @@ def test_refused_before_anything_runs(refused, scans, tmp_path, made, no_run):
     for code, words, message in (
         (1, "--pipeline gone.json -o a.ply", "gone.json: pipeline[0].filter: no filter is"),
         (2, "--pipeline s.json -o ./s.json", "is an input"),
-        (1, "--pipeline none.json -o a.ply", "none.json: No such file"),
+        (1, "--pipeline none.json -o a.ply", "none.json: no such file"),
         (2, "--pipeline part.json -o a.ply", "not lead from a cloud to a skeleton"),
     ):
         assert message in refused(code, "skeletonize", scans / "sample.ply", *words.split())
