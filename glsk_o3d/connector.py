@@ -74,19 +74,21 @@ class Connector(Filter[Skeleton]):
         radius: Any = resolve_length(f"{LEAST_RADIUS}%" if auto else self.radius, diagonal) / state.frame.scale
         if auto:
             radius = np.minimum(radius, RING_WIDTH * state.rings.mean_lengths(state.cloud[state.survivors]))
-        radii = np.maximum(radius, self.thickness * contraction_distance(state))
-        samples, vertex_of_survivor = farthest_point_sampling(state.positions, radii)
+        balls = np.maximum(radius, self.thickness * contraction_distance(state))
+        samples, vertex_of_survivor = farthest_point_sampling(state.positions, balls)
         mass = group_sum(state.mass, vertex_of_survivor, len(samples))[:, None]
         weighted = state.mass[:, None] * state.positions
         vertices = state.frame.out_of(group_sum(weighted, vertex_of_survivor, len(samples)) / mass)
         survivor = state.survivor_of_point
         vertex_of_point = np.where(survivor >= 0, vertex_of_survivor[survivor], -1)
         normals = np.full_like(state.points, np.nan)
+        normals[state.sampled] = state.normals[state.representative_of_point[state.sampled]]
+        radii = plane_distance_radii(vertices, vertex_of_point, state.points, normals)  # where copies count once
         normals[state.has_normal] = state.normals[state.representative_of_point[state.has_normal]]
         made = Skeleton(
             vertices=vertices,
             edges=self._edges(state, vertex_of_survivor),
-            radii=plane_distance_radii(vertices, vertex_of_point, state.points, normals),
+            radii=radii,
             vertex_of_point=vertex_of_point,
             points=state.points,
             normals=normals,

@@ -91,9 +91,13 @@ def without_strays(skeleton: Skeleton) -> Skeleton:
 
     They are fewer than `LEAST_POINTS`, and than half of those of the largest component. Some edge must be left.
     """
-    count, owner, report = VertexPoints(skeleton).count, skeleton.vertex_of_point, skeleton.report
-    least = min(LEAST_POINTS, MAJORITY * np.bincount(skeleton.component_of_vertex, count).max(initial=0))
-    strays = (skeleton.degree == 0) & (count < least)
+    lone, owner, report = skeleton.degree == 0, skeleton.vertex_of_point, skeleton.report
+    if not lone.any():
+        return skeleton
+    rows = skeleton.supporting_points
+    rows = rows[first_in_their_place(skeleton.points[rows])]
+    count = np.bincount(owner[rows], minlength=len(lone))
+    strays = lone & (count < min(LEAST_POINTS, MAJORITY * np.bincount(skeleton.component_of_vertex, count).max()))
     if not strays.any() or not len(skeleton.edges):
         return skeleton
     gone = np.append(strays, False)[owner] & ~np.isnan(skeleton.normals[:, 0])
