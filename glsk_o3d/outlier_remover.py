@@ -22,6 +22,10 @@ LIMB_NEIGHBOURS = 64  # among points far from theirs, that a limb of an object i
 MIXED_SHARE = 0.01  # of all points that surely are mixed pixels if there are any; fewer are at ends of a scan
 # least second and third over first principal spread of points that fill space
 FILLED_SECOND, FILLED_THIRD = 0.35, 0.1
+MIXED_OR_TWIGS = (
+    "sparse points beside a surface may be mixed pixels of a depth camera or twigs, which cannot be told apart, and "
+    "are kept: if they are of a camera, filter its flying pixels first"
+)
 
 
 @documented
@@ -60,9 +64,11 @@ class OutlierRemover(Filter[Points]):
         if not self.outlier_factor:
             return points
         points.check_whole(self)
-        left, neighbours, n_mixed = inliers(
+        left, neighbours, n_mixed, doubtful = inliers(
             points.cloud, points.weight, points.neighbours, self.outlier_factor, MIN_POINTS, points.spread
         )
+        if doubtful:
+            points = replace(points, report=points.report.with_warning(MIXED_OR_TWIGS))
         if len(left) == len(points):
             return points
         gone = np.ones(len(points), bool)
@@ -78,22 +84,23 @@ def inliers(
     factor: float,
     least: int,
     spread: np.ndarray | None = None,
-) -> tuple[np.ndarray, np.ndarray, int]:
+) -> tuple[np.ndarray, np.ndarray, int, bool]:
     """The points left when those far from all others are set aside, round by round.
 
     An outlier is `factor` times farther from its neighbours than these are from theirs. Where there are many, its
     neighbours are outliers, too; then what floats in space goes, see `in_floating_cluster`. At least `least` points are
-    left. Returned are their rows (m,), ascending, their nearest neighbours among those left, (m, k), and the number of
-    mixed pixels, which go in the first round if the `spread` (n, 3) of the neighbourhoods is known.
+    left. Returned are their rows (m,), ascending, their nearest neighbours among those left, (m, k), the number of
+    mixed pixels, which go in the first round if the `spread` (n, 3) of the neighbourhoods is known, and whether there
+    may be others.
     """
-    left, distance, n_mixed = np.arange(len(points)), mean_distances(points, neighbours), 0
+    left, distance, n_mixed, doubtful = np.arange(len(points)), mean_distances(points, neighbours), 0, False
     for _ in range(MOST_ROUNDS):  # what is left of a cluster stands out once the rest is gone
         # as near as the neighbours would be if all were there
         mean = distance / np.sqrt(weight[left].take(neighbours).mean(axis=1))
         found = local_outlier_ratio(mean, neighbours) > factor
         if spread is not None:
-            mixed, spread = mixed_pixels(mean, neighbours, spread, factor), None
-            found, n_mixed = found | mixed, int(mixed.sum())
+            mixed, doubtful = mixed_pixels(mean, neighbours, spread, factor)
+            found, n_mixed, spread = found | mixed, int(mixed.sum()), None
         if mean.max() > FLOATING_RATIO * mean.min():  # else none can float
             found |= in_floating_cluster(points[left], weight[left], mean, neighbours)
         keep = np.flatnonzero(~found)
@@ -105,34 +112,36 @@ def inliers(
         distance, neighbours, there = distance[keep], index[neighbours[keep, :k]], points[left]
         near, neighbours[changed] = nearest_neighbours(there, k, of=there[changed])
         distance[changed] = near[:, 1:].mean(axis=1)
-    return left, neighbours, n_mixed
+    return left, neighbours, n_mixed, doubtful
 
 
-def mixed_pixels(mean: np.ndarray, neighbours: np.ndarray, spread: np.ndarray, factor: float) -> np.ndarray:
+def mixed_pixels(
+    mean: np.ndarray, neighbours: np.ndarray, spread: np.ndarray, factor: float
+) -> tuple[np.ndarray, bool]:
     """Points that hang between the edge of a surface and what a camera saw behind it, (n,) bool array.
 
     A pixel on an edge has a depth between front and back. Such points are sparse beside a surface a few steps away,
     and in none of their own, since their neighbourhoods are thick: with the ratio r of their distances to the spacing
     of the surface, and neighbourhoods t times as thick as wide, ``r^2 sqrt(t) > factor``. There are some only where
-    more than a few are so by far, with ``r sqrt(t) > factor``. Where little of a cloud is a surface, sparse points are
-    twigs.
+    more than a few are so by far, with ``r sqrt(t) > factor``. Where little of a cloud is a surface, or too much is
+    sparse, they may be twigs: then there are none, and the second result is True.
     """
     n, (third, second, first) = len(mean), spread.T
     flat = (third < FILLED_THIRD * second) & (second > FILLED_SECOND * first)
     none, few = np.zeros(n, bool), max(MIXED_SHARE * n, 2 * neighbours.shape[1])
-    if np.count_nonzero(flat) < 2 * FLOATING_SHARE * n:
-        return none
     thick = mean * np.sqrt(np.sqrt(third / np.maximum(second, TINY)))
     densest = np.where(flat, mean, np.inf)
     if np.count_nonzero(thick > factor * densest.min()) <= few:  # as in most clouds
-        return none
+        return none, False
     each = np.ascontiguousarray(neighbours.T)
     for _ in range(DENSEST_HOPS + 1):
         densest = densest.take(each).min(axis=0)
     if np.count_nonzero(thick > factor * densest) <= few:
-        return none
+        return none, False
     found = thick > np.sqrt(factor) * densest
-    return found if np.count_nonzero(found) < FLOATING_SHARE * n else none
+    surface, sparse = np.count_nonzero(flat) / n, np.count_nonzero(found) / n
+    clear = surface >= 2 * FLOATING_SHARE and sparse < FLOATING_SHARE
+    return (found if clear else none), not clear
 
 
 def in_floating_cluster(points: np.ndarray, weight: np.ndarray, mean: np.ndarray, neighbours: np.ndarray) -> np.ndarray:

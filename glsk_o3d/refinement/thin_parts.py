@@ -59,7 +59,8 @@ class SpacedPoints(VertexPoints):
     def scattered(self) -> np.ndarray:
         """Whether each of them is one of many that fill space, (n,) bool array, as noise as wide as its part does."""
         near = nearest_neighbours(self.points, min(RIDGE_NEIGHBOURS, len(self.points)))[1]
-        return noise_share(principal(self.points, near)[0], near) > 0
+        inner = self.points / max(np.ptp(self.points, axis=0).max(), TINY)  # whose fourth powers do not overflow
+        return noise_share(principal(inner, near)[0], near) > 0
 
 
 def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
