@@ -81,14 +81,14 @@ class Connector(Filter[Skeleton]):
         vertices = state.frame.out_of(group_sum(weighted, vertex_of_survivor, len(samples)) / mass)
         survivor = state.survivor_of_point
         vertex_of_point = np.where(survivor >= 0, vertex_of_survivor[survivor], -1)
+        # copies, and what a sample stands for, count with one point
+        once = np.where(state.sampled, vertex_of_point, -1)
         normals = np.full_like(state.points, np.nan)
-        normals[state.sampled] = state.normals[state.representative_of_point[state.sampled]]
-        radii = plane_distance_radii(vertices, vertex_of_point, state.points, normals)  # where copies count once
         normals[state.has_normal] = state.normals[state.representative_of_point[state.has_normal]]
         made = Skeleton(
             vertices=vertices,
             edges=self._edges(state, vertex_of_survivor),
-            radii=radii,
+            radii=plane_distance_radii(vertices, once, state.points, normals),
             vertex_of_point=vertex_of_point,
             points=state.points,
             normals=normals,

@@ -74,11 +74,8 @@ class Thinner(Filter[Points]):
         if report.is_sampled and self.thin_to != "auto" and self.thin_to > report.n_sampled:
             told = f"Thinner.thin_to = {self.thin_to}: the Sampler left {report.n_sampled} points: set Sampler.size"
             points = replace(points, report=report.with_warning(told))
-        most = (
-            default_size(max(report.n_input - report.n_dropped, report.n_by_area))
-            if self.thin_to == "auto"
-            else self.thin_to
-        )
+        n = max(report.n_input - report.n_dropped, report.n_by_area)
+        most = default_size(n) if self.thin_to == "auto" else self.thin_to
         if most < len(points):
             points = _merged(points, thin(points.cloud[points.survivors], points.neighbours, most))
         return points

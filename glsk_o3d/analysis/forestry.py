@@ -105,7 +105,8 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
     check_number("unit", unit, low=0, open_low=True)
     pieces = cylinders(skeleton, root, up)
     foot, onward = pieces.start_point[0], pieces.end_point[0]
-    ground = lowest_around(skeleton, foot, onward, float(pieces.radius[0]), up)
+    near = points_near(skeleton)
+    ground = lowest_around(skeleton.points[near], foot, onward, float(pieces.radius[0]), up)
 
     def height(places: np.ndarray) -> np.ndarray:
         return unit * (along_axis(places, up) - ground)
@@ -113,7 +114,6 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
     stem = pieces.order == 0
     bottom, top = height(pieces.start_point), height(pieces.end_point)
     low, high = min(bottom.min(), top.min()), max(bottom.max(), top.max())
-    near = points_near(skeleton)
     highest = float(height(skeleton.points[near]).max() if len(near) else high)
     leaving = bottom[(pieces.order == 1) & stem[pieces.parent]]
     traced = pieces.confidence == 0  # unknown is not

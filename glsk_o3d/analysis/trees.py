@@ -165,10 +165,9 @@ def points_near(skeleton: Any) -> np.ndarray:
     return some[away <= (OUTSIDE * skeleton.radii + longest)[owner[some]]]
 
 
-def lowest_around(skeleton: Any, foot: np.ndarray, onward: np.ndarray, radius: float, up: str) -> float:
+def lowest_around(points: np.ndarray, foot: np.ndarray, onward: np.ndarray, radius: float, up: str) -> float:
     """How high the lowest point within three radii of the foot of a stem is; if it leads down, how high the foot is."""
     height, ahead = along_axis(np.array([foot, onward]), up)
-    points = skeleton.points[points_near(skeleton)]
     low = along_axis(points[norm(points - foot) <= OUTSIDE * radius], up)
     return float(low.min() if len(low) and ahead > height - OUTSIDE * radius else height)
 
@@ -176,7 +175,7 @@ def lowest_around(skeleton: Any, foot: np.ndarray, onward: np.ndarray, radius: f
 def _begun(skeleton: Any, path: np.ndarray, along: np.ndarray, start: float, up: str) -> float:
     """The first length along a stem, from a start on, at which it is as high as the lowest point there."""
     curve, lengths = skeleton.vertices[path], np.append(start, along[along > start])
-    lowest = lowest_around(skeleton, curve[0], curve[-1], skeleton.radii[path[0]], up)
+    lowest = lowest_around(skeleton.points[points_near(skeleton)], curve[0], curve[-1], skeleton.radii[path[0]], up)
     height = along_axis(_place_beyond(curve, along, lengths), up)
     k = int(np.argmax(height >= lowest))
     return float(np.interp(lowest, height[k - 1 : k + 1], lengths[k - 1 : k + 1])) if k else start

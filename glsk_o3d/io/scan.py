@@ -46,14 +46,16 @@ class Scan:
 
     def __getitem__(self, rows: np.ndarray) -> Scan:
         """Some of the points, and the triangles between them if `rows` are a bool array."""
-        whole = rows[self.triangles].all(axis=1) if rows.dtype == bool else slice(0)
+        triangles = NO_TRIANGLES
+        if len(self.triangles) and rows.dtype == bool:
+            triangles = (np.cumsum(rows) - 1)[self.triangles[rows[self.triangles].all(axis=1)]]
         return replace(
             self,
             positions=self.positions[rows],
             colors=None if self.colors is None else self.colors[rows],
             normals=None if self.normals is None else self.normals[rows],
             attributes={name: values[rows] for name, values in self.attributes.items()},
-            triangles=(np.cumsum(rows) - 1)[self.triangles[whole]],
+            triangles=triangles,
         )
 
     def by_area(self) -> Scan:

@@ -92,8 +92,11 @@ def _sampled(
         if dropped and not drop_invalid:
             raise not_finite(dropped, at, first)
 
-    whole = list(blocks()) if promised_points(path) is None else None  # one block: not to be read again and again
-    points, counts = sample_blocks(blocks if whole is None else lambda: whole, size)
+    if promised_points(path) is None:  # it is one block: no need to read it again and again
+        whole = list(blocks())
+        points, counts = sample_blocks(lambda: whole, size)
+    else:
+        points, counts = sample_blocks(blocks, size)
     if len(points) == 0:
         raise InvalidCloudError(f"{os.fspath(path)}: there is no point with finite coordinates")
     return points, counts, dropped

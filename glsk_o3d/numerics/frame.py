@@ -118,7 +118,7 @@ def to_working_frame(
             return frame, cloud, kept, row, weight, near
         place, copy = np.nonzero(same)
         group = component_labels(len(cloud), np.column_stack([place, near[place, copy]]))
-        first, group = np.unique(group, return_index=True, return_inverse=True)[1:]
+        first = np.unique(group, return_index=True)[1]
         stays = np.zeros(len(cloud), bool)
         stays[first] = True
         merged = (np.cumsum(stays) - 1)[first[group]]

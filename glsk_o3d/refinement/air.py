@@ -12,7 +12,7 @@ from ..numerics.vectors import TINY
 from ..skeleton import Skeleton
 from .evidence import Evidence
 from .loops import crossings, positions
-from .merging import drop_edges, drop_lone_vertices
+from .merging import drop_edges, drop_vertices
 
 AIR_WINDOW = 1.0  # derived: radii of a branch along which evidence is averaged; a false edge is two radii long or more
 # fitted: radii over which it is seen where a skeleton goes: beyond an edge, but the first third, or to an end
@@ -35,7 +35,8 @@ def cut_air(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skele
             gone.append(sorted(weakest.tolist()))
     if not gone:
         return skeleton, decisions
-    return drop_lone_vertices(drop_edges(skeleton, gone)), decisions
+    cut = drop_edges(skeleton, gone)
+    return drop_vertices(cut, cut.degree == 0), decisions
 
 
 def branch_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[np.ndarray, int, dict[str, float]]]:

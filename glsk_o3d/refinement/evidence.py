@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -27,6 +27,26 @@ REFINED_POINTS = 16384  # measured: points without noise that a graph is refined
 # measured: points of one object beyond which a surface hangs together in the same way, and noisy ones down to about
 ENOUGH_POINTS = 4096  # which they are averaged
 VERTEX_POINTS = 32  # derived: points to a vertex of a tube with 20 around it, whose vertices are half a radius apart
+
+
+Asked = TypeVar("Asked")
+Answer = TypeVar("Answer")
+
+
+def ask_once(
+    known: dict[bytes, Answer],
+    names: Sequence[bytes],
+    asked: Iterable[Asked],
+    ask: Callable[[list[Asked]], Iterable[Answer]],
+) -> list[Answer]:
+    """The answer for each of some things, of which those with new `names` are asked for together, and then `known`.
+
+    A name is all that the answer hangs on, so that it is the same when other parts of the skeleton have changed.
+    """
+    fresh = {name: each for name, each in zip(names, asked, strict=True) if name not in known}
+    if fresh:
+        known.update(zip(fresh, ask([*fresh.values()]), strict=True))
+    return [known[name] for name in names]
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,9 +126,7 @@ class Evidence(SurfaceGraph):
     def winding_at(self, vertices: np.ndarray) -> np.ndarray:
         """The same of vertices, which stay where they are while others are merged: of each it is asked once."""
         names = [place.tobytes() for place in vertices]
-        fresh = [row for row, name in enumerate(names) if name not in self._wound]
-        self._wound.update(zip([names[row] for row in fresh], self.winding(vertices[fresh]).tolist(), strict=True))
-        return np.array([self._wound[name] for name in names])
+        return np.array(ask_once(self._wound, names, vertices, lambda fresh: self.winding(np.array(fresh)).tolist()))
 
     def winding_along(self, skeleton: Skeleton) -> np.ndarray:
         """That at the middle of every edge, (E,) float array."""

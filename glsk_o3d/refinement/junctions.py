@@ -183,6 +183,8 @@ def _through_air(skeleton: Skeleton, places: dict[int, _Place]) -> np.ndarray:
 
     There, none is within two radii of the thickest limb.
     """
+    if not places:
+        return np.empty((0, 2, 3))
     ends = np.array([(it.place, line.lead[:2][-1]) for it in places.values() for line in it.lines]).reshape(-1, 2, 3)
     thickest = [max(line.radius for line in it.lines) for it in places.values() for _ in it.lines]
     away = cKDTree(skeleton.points[skeleton.vertex_of_point >= 0]).query(ends.mean(axis=1))[0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import TINY
 from ..skeleton import Skeleton
 from .diagnostics import MAJORITY
-from .evidence import LEAST_INSIDE, Evidence
+from .evidence import LEAST_INSIDE, Evidence, ask_once
 from .merging import collapse_triangles, drop_edges, merge_vertices
 from .sections import VertexPoints
 from .thin_parts import SURFACE_GROWTH, UNSURE_CONFIDENCE, SpacedPoints
@@ -40,10 +41,8 @@ def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
     while True:
         cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
         names = [skeleton.vertices[cycle].tobytes() for cycle in cycles]
-        fresh = {name: cycle for name, cycle in zip(names, cycles, strict=True) if name not in known}
-        known.update(zip(fresh, loop_facts(skeleton, [*fresh.values()], evidence), strict=True))
+        loops = ask_once(known, names, cycles, partial(loop_facts, skeleton, evidence=evidence))
         kept, narrow, cut, used = list[Decision](), [], [], set[int]()
-        loops = [known[name] for name in names]
         wires = _is_frame_of_wires(skeleton, cycles, loops) if wires is None else wires
         for cycle, loop in zip(cycles, loops, strict=True):
             if wires and (skeleton.confidence[cycle] < UNSURE_CONFIDENCE).mean() > MAJORITY:

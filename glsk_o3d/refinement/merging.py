@@ -53,9 +53,9 @@ def drop_edges(skeleton: Skeleton, gone: ArrayLike) -> Skeleton:
     return replace(skeleton, edges=skeleton.edges[~dropped])
 
 
-def drop_lone_vertices(skeleton: Skeleton, strays: np.ndarray | None = None) -> Skeleton:
-    """Drop vertices without edges, or `strays` (M,), unless there is nothing else; points go to the nearest left."""
-    left = np.flatnonzero(skeleton.degree > 0 if strays is None else ~strays)
+def drop_vertices(skeleton: Skeleton, lone: np.ndarray) -> Skeleton:
+    """Drop `lone` (M,) vertices, without edges, unless there are no others; their points go to the nearest left."""
+    left = np.flatnonzero(~lone)
     if len(left) in (0, len(skeleton.vertices)):
         return skeleton
     representative = cKDTree(skeleton.vertices[left]).query(skeleton.vertices)[1]

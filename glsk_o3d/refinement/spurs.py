@@ -2,6 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Iterator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +13,7 @@ from ..numerics.neighbourhoods import plane_axes
 from ..numerics.polylines import arc_lengths, place_at, relative_distance
 from ..numerics.vectors import TINY, cross, norm, unit
 from ..skeleton import Skeleton
-from .evidence import Evidence
+from .evidence import Evidence, ask_once
 from .limbs import Limbs
 from .merging import merge_into, with_fields
 from .sections import VertexPoints, measure_sections
@@ -96,12 +97,8 @@ def _twigs(skeleton: Skeleton, evidence: Evidence, known: dict[bytes, dict[str, 
     paths = enumerate(branch[::-1] if degree[branch[0]] == 1 else branch for branch in limbs.branches)
     found = [(k, path) for k, path in paths if degree[path[0]] > 2 and degree[path[-1]] == 1]
     names = [limbs.signature(int(path[0])) + skeleton.vertices[path].tobytes() for _, path in found]
-    fresh = {name: branch for name, branch in zip(names, found, strict=True) if name not in known}
-    if fresh:
-        known.update(zip(fresh, _facts(skeleton, evidence, limbs, [*fresh.values()]), strict=True))
-    return [
-        _Twig(int(path[0]), path[1:], int(path[-1]), known[name]) for (_, path), name in zip(found, names, strict=True)
-    ]
+    facts = ask_once(known, names, found, partial(_facts, skeleton, evidence, limbs))
+    return [_Twig(int(path[0]), path[1:], int(path[-1]), each) for (_, path), each in zip(found, facts, strict=True)]
 
 
 def _facts(

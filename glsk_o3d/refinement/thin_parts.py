@@ -17,7 +17,7 @@ from ..numerics.winding import AREA_NEIGHBOURS
 from ..points import RIDGE_NEIGHBOURS, noise_share
 from ..skeleton import Skeleton
 from .diagnostics import MAJORITY, SHEET_SHARE, STUB_LENGTH
-from .merging import drop_lone_vertices, with_fields
+from .merging import drop_vertices, with_fields
 from .sections import VertexPoints
 
 SAME_PLACE = 1e-6  # derived: share of the cloud's extent below which points are not apart
@@ -106,7 +106,7 @@ def without_strays(skeleton: Skeleton) -> Skeleton:
     n_outliers, n_distinct = report.n_outliers + int(gone.sum()), report.n_distinct - distinct
     report = replace(report, n_outliers=n_outliers, n_distinct=n_distinct)
     normals = np.where(gone[:, None], np.nan, skeleton.normals)
-    return drop_lone_vertices(with_fields(skeleton, normals=normals, report=report), strays)
+    return drop_vertices(with_fields(skeleton, normals=normals, report=report), strays)
 
 
 def may_lack_surface(skeleton: Skeleton, least: float) -> bool:

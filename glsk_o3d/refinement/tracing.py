@@ -210,8 +210,19 @@ def _meetings(vertices: np.ndarray, edges: np.ndarray, tips: np.ndarray, scale: 
     return tips[found].reshape(-1, 2)
 
 
+def spread_around(skeleton: Skeleton) -> np.ndarray:
+    """Median distance from the curve to the points around every vertex and its neighbours, (M,) float array.
+
+    Of points on a tube its radius, and outliers have little say.
+    """
+    return group_median(*_distances(skeleton), len(skeleton.vertices))
+
+
 def thickness_around(skeleton: Skeleton) -> np.ndarray:
-    """The same of points that are not the curve itself; where they are too few, that of the nearest with more."""
+    """The same of points that the curve does not run through; where they are too few, that of the nearest with more.
+
+    Their median is the radius of a part whose vertices are some of its points.
+    """
     away, vertex = _distances(skeleton)
     off = away > SAME_PLACE * np.ptp(skeleton.vertices, axis=0).max()
     thickness = group_median(away[off], vertex[off], len(skeleton.vertices))
@@ -223,14 +234,6 @@ def thickness_around(skeleton: Skeleton) -> np.ndarray:
     reached = nearest >= 0
     thickness[reached] = thickness[nearest[reached]]
     return thickness
-
-
-def spread_around(skeleton: Skeleton) -> np.ndarray:
-    """Median distance from the curve to the points around every vertex and its neighbours, (M,) float array.
-
-    Of points on a tube its radius, and outliers have little say.
-    """
-    return group_median(*_distances(skeleton), len(skeleton.vertices))
 
 
 def _distances(skeleton: Skeleton) -> tuple[np.ndarray, np.ndarray]:
@@ -261,10 +264,8 @@ def drop_spurious(
         if not twigs:
             return skeleton, stays
         forks, tips = np.array([path[[0, -1]] for path in twigs]).T
-        body, twig = (
-            np.concatenate([path[1:] for path in twigs]),
-            np.repeat(np.arange(len(tips)), [len(path) - 1 for path in twigs]),
-        )
+        body = np.concatenate([path[1:] for path in twigs])
+        twig = np.repeat(np.arange(len(tips)), [len(path) - 1 for path in twigs])
         rest = np.delete(np.arange(len(traced)), body)
         away, nearest = cKDTree(skeleton.vertices[rest]).query(skeleton.vertices[tips])
         beside = rest[nearest]

@@ -75,11 +75,12 @@ def _layout(stream: TextIO) -> Layout:
     for skip, line in enumerate(islice(stream, HEADER_LINES)):
         comment = next((mark for mark in _COMMENTS if line.lstrip().startswith(mark)), "")
         line = line.strip().removeprefix(comment)
-        for delimiter in [";"] if ";" in line else [",", None, ","] if "," in line else [None]:
-            words = [word.strip().strip("\"'") for word in line.split(delimiter)]
-            columns = [i for i, word in enumerate(words) if not comment and _number(word, delimiter) is not None]
-            if len(columns) >= 3:
-                break
+        delimiter = ";" if ";" in line else "," if "," in line else None
+        words, columns = _parted(line, delimiter)
+        if delimiter == "," and len(columns) < 3 and len(_parted(line, None)[1]) >= 3:
+            delimiter = None  # its commas are decimal points
+            words, columns = _parted(line, None)
+        columns = [] if comment else columns
         if len(columns) > MOST_COLUMNS:
             raise ValueError(f"a line has {len(columns)} numbers, and at most {MOST_COLUMNS} are read")
         if len(columns) >= 3:
@@ -134,6 +135,12 @@ def _whole(values: np.ndarray) -> np.ndarray:
     with np.errstate(invalid="ignore"):
         whole = np.isfinite(values).all() and (np.abs(values) < 2**31).all() and (values == np.round(values)).all()
     return values.astype(np.int32) if whole else values
+
+
+def _parted(line: str, delimiter: str | None) -> tuple[list[str], list[int]]:
+    """The words of a line, and which of them are numbers."""
+    words = [word.strip().strip("\"'") for word in line.split(delimiter)]
+    return words, [i for i, word in enumerate(words) if _number(word, delimiter) is not None]
 
 
 def _number(word: str, delimiter: str | None) -> float | None:
