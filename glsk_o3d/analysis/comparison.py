@@ -180,7 +180,7 @@ def matching_f1(found: np.ndarray, true: np.ndarray, reach: np.ndarray) -> float
 
 
 def matched(found: np.ndarray, true: np.ndarray, reach: np.ndarray) -> list[tuple[int, int]]:
-    """The pairs of `matching_f1`: a list of (row of `found`, row of `true`)."""
+    """The pairs of `matching_f1`: a list of (row of `found`, row of `true`); `reach` may also be (n, m)."""
     apart = cdist(found, true)
     return nearest_pairs(np.where(apart <= reach, apart, np.inf))
 

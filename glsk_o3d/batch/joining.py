@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.cluster.hierarchy import DisjointSet
 from scipy.spatial import cKDTree
-from scipy.spatial.distance import cdist
 
+from ..analysis.comparison import matched
 from ..analysis.curves import along, pieces, simple_edges
 from ..numerics.groups import component_labels
 from ..numerics.vectors import dot, norm
@@ -278,16 +278,12 @@ class _Joint:
         known = set(theirs.vertex.tolist())
         waiting = {at: values for at, values in self._open.items() if at in known}
         mine, others = (np.array(list(each.values())).reshape(-1, 8) for each in (ends, waiting))
-        distance = cdist(mine[:, :3], others[:, :3])
-        near = distance <= mine[:, None, 5] + others[:, 5]
-        rows, columns = np.nonzero(near)
         one_of, other_of = list(ends), list(waiting)
         loose = dict(ends)
-        for pair in np.argsort(distance[near], kind="stable"):
-            one, other = one_of[rows[pair]], other_of[columns[pair]]
-            if one in loose and other in self._open:
-                self._merged.append((one, other))
-                del loose[one], self._open[other]
+        for row, column in matched(mine[:, :3], others[:, :3], mine[:, None, 5] + others[:, 5]):
+            one, other = one_of[row], other_of[column]
+            self._merged.append((one, other))
+            del loose[one], self._open[other]
         if loose:
             nearest = cKDTree(theirs.places).query(np.array(list(loose.values()))[:, :3])[1]
             self._touching += zip(loose, theirs.vertex[nearest].tolist(), strict=True)
