@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.clouds import cloud_points
 from ..numerics.polylines import nearest_on_edges
+from ..numerics.vectors import finite_rows
 from ..skeleton import Skeleton
 from .curves import along, pieces
 
@@ -59,26 +60,16 @@ def vertex_of_cloud(skeleton: Skeleton, cloud: Any = None) -> tuple[np.ndarray, 
         if len(skeleton.points) == 0:
             raise InvalidCloudError("this skeleton came without its cloud: give the cloud, too")
         return skeleton.points, skeleton.vertex_of_point
-    points = cloud_points(cloud)
-    if (skeleton.vertex_of_point >= 0).any():
-        return points, label_of_nearest(skeleton.points, skeleton.vertex_of_point, points)
-    vertex = np.full(len(points), -1)
-    finite = np.isfinite(points).all(axis=1)
-    vertex[finite] = _nearest_vertex(skeleton, points[finite])
+    points, known = cloud_points(cloud), np.flatnonzero(skeleton.vertex_of_point >= 0)
+    if len(known) and np.array_equal(skeleton.points, points, equal_nan=True):
+        return points, skeleton.vertex_of_point
+    vertex, finite = np.full(len(points), -1), finite_rows(points)
+    if len(known):
+        nearest = known[cKDTree(skeleton.points[known]).query(points[finite])[1]]
+        vertex[finite] = skeleton.vertex_of_point[nearest]
+    else:
+        vertex[finite] = _nearest_vertex(skeleton, points[finite])
     return points, vertex
-
-
-def label_of_nearest(points: np.ndarray, label: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Labels of other points, (n,) int array: each has that of the nearest point that has one, not below 0.
-
-    They are `label` itself if the points are the same; otherwise -1 only for points that are not finite.
-    """
-    if np.array_equal(points, others, equal_nan=True):
-        return label
-    known, finite = np.flatnonzero(label >= 0), np.isfinite(others).all(axis=1)
-    found = np.full(len(others), -1)
-    found[finite] = label[known[cKDTree(points[known]).query(others[finite])[1]]]
-    return found
 
 
 def _nearest_vertex(skeleton: Skeleton, points: np.ndarray) -> Any:
