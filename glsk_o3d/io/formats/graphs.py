@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...analysis.branches import branch_table
+from ...analysis.curves import simple_edges
 from ...editing.edits import cut_loops, reroot
 from ...errors import FileFormatError
 from ...refinement.rooted import RootPlace, numbered_from
@@ -26,9 +27,7 @@ def graph_skeleton(
     itself are dropped. `known` are other fields of the vertices.
     """
     vertices = np.asarray(vertices, float).reshape(-1, 3)
-    edges = np.sort(np.asarray(edges, np.int64).reshape(-1, 2), axis=1)
-    edges = np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0)
-    none = np.empty(0)
+    edges, none = simple_edges(np.asarray(edges, np.int64).reshape(-1, 2)), np.empty(0)
     return Skeleton(vertices, edges, radii, vertex_of_point=none, points=none, normals=none, **known)  # type: ignore[arg-type]
 
 
