@@ -93,7 +93,9 @@ class Skeletonizer:
         try:
             while True:
                 try:
-                    sent = _sent(next(taken))
+                    cloud = next(taken)
+                    if open3d_class(cloud) != ("PointCloud", True):  # Open3D's others cannot be sent to a process
+                        cloud = surface_mesh(cloud)
                 except StopIteration:
                     break
                 except Exception as error:  # of a cloud, or of what gives them: after what is underway
@@ -101,7 +103,7 @@ class Skeletonizer:
                     break
                 if pool is not self._pool:
                     raise BatchError(CLOSED)
-                waiting.append(pool.submit(_skeletonized, self._recipe, sent))
+                waiting.append(pool.submit(_skeletonized, self._recipe, cloud))
                 if len(waiting) > self._count:
                     yield _told(waiting.popleft())
             while waiting:
@@ -111,11 +113,6 @@ class Skeletonizer:
                 future.cancel()
         if problem is not None:
             raise problem
-
-
-def _sent(cloud: Any) -> Any:
-    """What another process is sent of a cloud: Open3D's others than tensor clouds cannot be."""
-    return cloud if open3d_class(cloud) == ("PointCloud", True) else surface_mesh(cloud)
 
 
 def _skeletonized(recipe: dict[str, Any], cloud: Any) -> Skeleton:

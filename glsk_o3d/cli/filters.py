@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import re
-from collections.abc import Callable
 from itertools import chain
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,7 +15,6 @@ from .reporting import WrongUsage
 
 if TYPE_CHECKING:
     from ..parameters import Parameters
-    from ..pipeline import Pipeline
 
 
 def filters(
@@ -34,7 +32,11 @@ def filters(
         raise WrongUsage(did_you_mean(name, [*known, *pipelines], "filter or pipeline"))
     found = {
         "filters": [_filter_facts(cls) for key, cls in known.items() if name in (None, key)],
-        "pipelines": [_pipeline_facts(key, make) for key, make in pipelines.items() if name in (None, key)],
+        "pipelines": [
+            {"name": key, "kind": "pipeline", **_origin(make), "expression": " | ".join(map(repr, make().stages))}
+            for key, make in pipelines.items()
+            if name in (None, key)
+        ],
     }
 
     def words() -> None:
@@ -58,11 +60,6 @@ def _filter_facts(cls: type[Parameters]) -> dict[str, Any]:
     defaults = [repr(each.default) if dataclasses.is_dataclass(each.default) else each.default for each in fields]
     parameters = [{"name": f.name, **f.metadata, "default": told} for f, told in zip(fields, defaults, strict=True)]
     return {"name": cls.__name__, "kind": kind, **_origin(cls), **flow, "parameters": parameters}
-
-
-def _pipeline_facts(name: str, make: Callable[[], Pipeline[Any]]) -> dict[str, Any]:
-    stages = make().stages
-    return {"name": name, "kind": "pipeline", **_origin(make), "expression": " | ".join(map(repr, stages))}
 
 
 def _origin(thing: Any) -> dict[str, Any]:

@@ -17,11 +17,6 @@ def clean_faces(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return faces[first[np.cross(b - a, c - a).any(axis=1)]]
 
 
-def sides(faces: np.ndarray) -> np.ndarray:
-    """The sides of every triangle in its direction, (3 f, 2) int array."""
-    return np.concatenate([faces[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
-
-
 def umbrellas(n: int, faces: np.ndarray) -> np.ndarray:
     """Vertices whose triangles make one closed umbrella, (n,) bool array: neither border nor fan of fans nor bare.
 
@@ -41,6 +36,6 @@ def mesh_rings(n: int, faces: np.ndarray) -> Rings:
 
     They are ascending, not in rotational order, since there may be none: `triangles` mean nothing.
     """
-    edges = sides(faces)
+    edges = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)  # the sides of every triangle
     centre, neighbour = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0).T
     return Rings(np.searchsorted(centre, np.arange(n + 1)), neighbour, umbrellas(n, faces))

@@ -152,26 +152,20 @@ def prune(skeleton: Skeleton, *, length: float = 0.0, order: int | None = None) 
     check_number("length", length, "float", low=0)
     check_number("order", order, "int?", low=0)
     if order is not None:
-        skeleton = _without_orders(skeleton, order)
+        if skeleton.n_loops:
+            trees = "branches have an order in a tree; see cut_loops (--cut-loops)"
+            raise InvalidParameterError(f"the skeleton has {skeleton.n_loops} loops: {trees}")
+        table, group = branch_table(skeleton), np.arange(len(skeleton.vertices))
+        for row in np.argsort(table.level, kind="stable").tolist():  # parents before their children
+            if table.order[row] > order:
+                group[skeleton.branches[row]] = group[table.start[row]]
+        skeleton = merge_into(skeleton, group)
     while ends := _short_ends(skeleton, length):
         group = np.arange(len(skeleton.vertices))
         for path in ends:
             group[path] = path[0]
         skeleton = merge_into(skeleton, group)
     return skeleton
-
-
-def _without_orders(skeleton: Skeleton, order: int) -> Skeleton:
-    if skeleton.n_loops:
-        raise InvalidParameterError(
-            f"the skeleton has {skeleton.n_loops} loops: branches have an order in a tree; see cut_loops (--cut-loops)"
-        )
-    table = branch_table(skeleton)
-    group = np.arange(len(skeleton.vertices))
-    for row in np.argsort(table.level, kind="stable").tolist():  # parents before their children
-        if table.order[row] > order:
-            group[skeleton.branches[row]] = group[table.start[row]]
-    return merge_into(skeleton, group)
 
 
 def _short_ends(skeleton: Skeleton, least: float) -> list[np.ndarray]:

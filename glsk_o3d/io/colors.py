@@ -33,7 +33,11 @@ def shades(skeleton: Skeleton, color: ColorChoice, branch: np.ndarray, vertices:
         order = branch_table(skeleton).order if len(branch) else np.zeros(1, int)
         return ramp(np.where(branch >= 0, order[branch] / max(order.max(), 1), np.nan))
     vertices = vertices if vertices.ndim == 2 else vertices[:, None]
-    values = _of_vertices(skeleton, color)
+    values = skeleton.support if color == "support" else skeleton.confidence
+    if color == "radius":
+        radii = skeleton.radii
+        low, high = np.nanmin(radii, initial=np.inf), np.nanmax(radii, initial=-np.inf)
+        values = (radii - low) / (high - low) if high > low else np.where(np.isnan(radii), np.nan, 0)
     return ramp(np.where((vertices >= 0).all(axis=1), values[vertices].mean(axis=1), np.nan))
 
 
@@ -41,12 +45,3 @@ def ramp(shown: np.ndarray) -> np.ndarray:
     """Colours of numbers from 0 to 1; what is beyond has that of the end, NaN is grey."""
     viridis = require("matplotlib").colormaps["viridis"]
     return np.where(np.isnan(shown)[:, None], UNKNOWN_GREY, viridis(np.nan_to_num(shown))[:, :3])
-
-
-def _of_vertices(skeleton: Skeleton, color: str) -> np.ndarray:
-    """What a colour shows of the vertices, as numbers from 0 to 1."""
-    if color == "radius":
-        radii = skeleton.radii
-        low, high = np.nanmin(radii, initial=np.inf), np.nanmax(radii, initial=-np.inf)
-        return (radii - low) / (high - low) if high > low else np.where(np.isnan(radii), np.nan, 0)
-    return skeleton.confidence if color == "confidence" else skeleton.support

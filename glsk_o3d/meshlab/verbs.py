@@ -132,11 +132,6 @@ class Verb:
                 raise InvalidParameterError(f"{name} = {value!r}: {error}") from None
         return made
 
-    def in_units(self, values: Mapping[str, Any], diagonal: float) -> dict[str, Any]:
-        """Parameters with lengths in place of the percentages of a layer's diagonal."""
-        percent = {name: value for name, value in values.items() if self.slots[name].is_of_box(value)}
-        return {**values, **{name: resolve_length(value, diagonal) for name, value in percent.items()}}
-
     def plan(self, values: Mapping[str, Any]) -> Pipeline[Any]:
         """The pipeline with such parameters; refuses those of a filter that is not in it."""
         made = self.checked(values)
@@ -150,8 +145,9 @@ class Verb:
 
     def run(self, layer: Layer, given: Mapping[str, Any], on_iteration: Callable[..., Any] | None = None) -> Layer:
         """The new layer; percentages are of the diagonal of the given layer's bounding box."""
-        # a layer without extent is refused by the Sampler, in better words than a length of 0
-        pipeline = self.plan(self.in_units(given, layer.diagonal or 1.0))
+        diagonal = layer.diagonal or 1.0  # one without extent is refused by the Sampler, in better words than a length
+        percent = {name: value for name, value in given.items() if self.slots[name].is_of_box(value)}
+        pipeline = self.plan({**given, **{name: resolve_length(value, diagonal) for name, value in percent.items()}})
         return self.shown(pipeline(layer.cloud(), on_iteration=on_iteration), layer)
 
     def shown(self, result: Any, source: Layer) -> Layer:
