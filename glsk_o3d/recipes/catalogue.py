@@ -32,9 +32,9 @@ def find(name: str) -> type[Parameters] | None:
 
 def serves(cls: type[Parameters], kind: str) -> bool:
     """Whether an instance can be a parameter of the type ``"reducer"`` or ``"stop"``, or a stage: ``"filter"``."""
-    if kind == "stop" or not issubclass(cls, Filter):
-        return kind == "stop" and not issubclass(cls, Filter)
-    return kind == "filter" or cls.consumes is cls.produces is Contraction
+    if not issubclass(cls, Filter):
+        return kind == "stop"
+    return kind == "filter" or (kind == "reducer" and cls.consumes is cls.produces is Contraction)
 
 
 def known_pipelines() -> dict[str, Callable[[], Pipeline[Any]]]:
