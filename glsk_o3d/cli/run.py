@@ -26,10 +26,13 @@ def run(
     The whole script is checked before anything is run. It needs pymeshlab.
     """
     from ..meshlab.layers import check_ending
+    from ..meshlab.script import comment, scripts
     from ..meshlab.steps import find_script, read_steps
 
     if listed:
-        _list()
+        found = {name: comment(path) for name, path in scripts().items()}
+        told = [{"name": name, "doc": doc} for name, doc in found.items()]
+        tell(told, lambda: print_table(list(found.items()), wrap=True))
         return
     if script is None or scan is None:
         raise WrongUsage("a SCRIPT and a SCAN are needed: glsk run SCRIPT SCAN -o FILE, or --list")
@@ -80,11 +83,3 @@ def _plain(result: Any) -> Any:
     if hasattr(result, "tolist"):
         return _plain(result.tolist())
     return result if isinstance(result, bool | int | float | str | None) else str(result)
-
-
-def _list() -> None:
-    from ..meshlab.script import comment, scripts
-
-    found = {name: comment(path) for name, path in scripts().items()}
-    told = [{"name": name, "doc": doc} for name, doc in found.items()]
-    tell(told, lambda: print_table(list(found.items()), wrap=True))

@@ -150,18 +150,13 @@ class Layer:
             save_skeleton(self.to_skeleton(), path, **options)
             return
         check_ending(path, "points" if self.faces is None else "points or mesh")
-        as_text = path.suffix.lower() == ".xyz"
-        write_atomically(
-            path, lambda file: np.savetxt(file, self.vertices, "%.17g") if as_text else self._write_ply(file)
-        )
-
-    def _write_ply(self, path: Path) -> None:
+        if path.suffix.lower() == ".xyz":
+            write_atomically(path, lambda file: np.savetxt(file, self.vertices, "%.17g"))
+            return
         colors = None if self.colors is None else self.colors[:, :3]
         known = {"positions": self.vertices, "normals": self.normals, "colors": colors, "quality": self.scalars}
         held = {name: np.asarray(values, float) for name, values in known.items() if values is not None}
-        path.write_bytes(
-            ply.content(ply.columns_of(held), self.faces if self.faces is not None and len(self.faces) else None)
-        )
+        ply.save(path, held, self.faces if self.faces is not None and len(self.faces) else None)
 
 
 def check_ending(path: Path, what: str) -> None:
