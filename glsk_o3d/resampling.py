@@ -23,7 +23,7 @@ from .numerics.vectors import TINY, norm
 from .parameters import check_number
 from .pipeline import Pipeline
 from .report import Report, warn
-from .skeleton import Skeleton
+from .skeleton import Skeleton, of_input
 
 SAMPLE_SHARE = 0.8  # fitted: of the points in each sample; halves doubt more that is right
 NEAR = 1.0  # fitted: local radii within which a curve shows a place of another
@@ -110,6 +110,8 @@ def with_support(
 
     The other arguments are those of `support`.
     """
+    if skeleton.lacks_sample:
+        raise InvalidCloudError("this skeleton of a mesh was changed and has no sample of its surface: make it anew")
     whole = skeleton.whole
     points = whole.points[whole.vertex_of_point >= 0][-skeleton.report.n_by_area :]  # of a mesh, those by area
     others, rng = [], np.random.default_rng(seed)
@@ -123,7 +125,7 @@ def with_support(
                 others.append(pipeline(points[rows]))
             except InvalidCloudError:  # too few points are left: they show nothing
                 others.append(Skeleton((), (), (), (), (), ()))  # type: ignore[arg-type]
-    return _supported(skeleton, others)
+    return of_input(_supported(whole, others))
 
 
 def _supported(skeleton: Skeleton, others: list[Skeleton]) -> Skeleton:

@@ -1,6 +1,6 @@
 """Sampler: cloud -> points in a working frame, of a large cloud a sample."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
 
 from .parameters import documented, parameter
@@ -58,7 +58,11 @@ class Sampler(Filter[Points]):
     drop_invalid: bool = parameter(False, "Drop points with NaN or infinite coordinates instead of refusing.")
 
     def _run(self, cloud: Any, watch: Watch | None) -> Points:
-        return Points.of(cloud, self.sample_size, self.frame, self.drop_invalid, self.sample)
+        points = Points.of(cloud, self.sample_size, self.frame, self.drop_invalid, self.sample)
+        if isinstance(self.sample, str) or points.report.n_by_area:
+            return points
+        told = f"Sampler.sample = {self.sample}: the cloud has no triangles with an area: its points are taken"
+        return replace(points, report=points.report.with_warning(told))
 
     def sample_size(self, n: int) -> int:
         """Size of the sample of n points if n is more than twice as large."""

@@ -152,8 +152,13 @@ class Skeleton:
 
     @property
     def whole(self) -> Skeleton:
-        """This with the points by area of a sampled mesh behind its vertices, if a pipeline has just made it."""
+        """This with the points by area of a sampled mesh behind its vertices, as a pipeline or a file gave it."""
         return vars(self).get("_whole", self)
+
+    @property
+    def lacks_sample(self) -> bool:
+        """Whether its mesh was sampled, and it was changed and has the vertices alone: they do not show the object."""
+        return 0 < self.report.n_by_area > len(self.whole.points) - self.report.n_input
 
     @property
     def leaves(self) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import glsk_o3d as glsk
-from glsk_o3d import InvalidCloudError, SkeletonWarning, pipelines, samples, skeletonize
+from glsk_o3d import InvalidCloudError, Sampler, SkeletonWarning, pipelines, samples, skeletonize
 
 NAMES = ("default", *(pytest.param(name, marks=pytest.mark.slow) for name in pipelines.PIPELINES if name != "default"))
 RNG = np.random.default_rng(0)
@@ -255,6 +255,18 @@ def test_what_is_a_copy_is_said_by_the_spacing(apart):
             single.n_loops,
             len(single.leaves),
         )
+
+
+@pytest.mark.parametrize("copies", [2, 16, 40])
+def test_many_near_copies_are_copies(copies):
+    """Also where all neighbours of a point are its copies, and far outliers say nothing about the spacing."""
+    rng = np.random.default_rng(0)
+    cloud = samples.two_rings(600).points
+    moved = np.repeat(cloud, copies, axis=0)
+    moved += 1e-10 * rng.normal(size=moved.shape)
+    for far in ([], [[300.0, 0, 0], [0, -200.0, 0]]):
+        state = Sampler(size="all")(np.concatenate([moved, np.reshape(far, (-1, 3))]))
+        assert len(state.cloud) == len(cloud) + len(far)
 
 
 def assert_equal_curves(one, other):

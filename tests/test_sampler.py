@@ -1,5 +1,6 @@
 """Sampler: cloud -> points."""
 
+import dataclasses
 from itertools import pairwise
 
 import numpy as np
@@ -20,6 +21,8 @@ from glsk_o3d import (
     Thinner,
     samples,
 )
+from glsk_o3d.analysis import Gripper, grasp_candidates
+from glsk_o3d.resampling import with_support
 
 TORUS = samples.torus(n=600).points
 
@@ -208,18 +211,54 @@ def test_vertices_that_are_not_finite_and_corners_that_are_missing():
 def test_samples_of_a_sampled_mesh_support_its_skeleton():
     skeleton = glsk.support(PIPE, draws=2, sample=4096)
     assert skeleton.report.n_agreeing == 2
-    assert len(skeleton.vertex_of_point) == len(PIPE.vertices)
+    assert skeleton.support.min() == 1
+    assert len(skeleton.whole.points) == len(PIPE.vertices) + 4096
+
+
+def test_files_keep_the_sample_of_a_mesh(tmp_path, axis):
+    for ending in (".npz", ".json"):
+        glsk.save_skeleton(axis, tmp_path / f"pipe{ending}")
+        known = glsk.read_skeleton(tmp_path / f"pipe{ending}")
+        np.testing.assert_array_equal(known.points, axis.points)
+        np.testing.assert_array_equal(known.vertex_of_point, axis.vertex_of_point)
+        np.testing.assert_array_equal(known.whole.points, axis.whole.points)
+        same(Refiner()(known), Refiner()(axis))
+
+
+def test_a_changed_skeleton_of_a_sampled_mesh_says_what_it_lacks(axis):
+    changed = dataclasses.replace(axis, half_width=axis.radii, half_thickness=axis.radii)
+    assert changed.lacks_sample
+    assert not axis.lacks_sample
+    assert Refiner()(changed).n_components == 1  # as of a skeleton without points
+    for ask in (
+        lambda: with_support(changed, glsk.pipelines.default(), 2),
+        lambda: grasp_candidates(changed, Gripper(2)),
+    ):
+        with pytest.raises(glsk.GlskError, match=r"was changed|has no points"):
+            ask()
+
+
+def test_a_sample_by_area_of_a_cloud_is_told_from_one_of_a_mesh(tmp_path):
+    points = np.asarray(PIPE.vertices)
+    with pytest.warns(glsk.SkeletonWarning, match=r"Sampler\.sample = 500: the cloud has no triangles"):
+        skeleton = glsk.skeletonize(np.repeat(points, 2, axis=0) + np.linspace(0, 0.1, 192)[:, None], sample=500)
+    assert skeleton.report.n_by_area == 0
+    o3d.io.write_triangle_mesh(str(tmp_path / "pipe.ply"), PIPE)
+    for choice, n in ((700, 700), ("vertices", len(points)), ("auto", 25000)):
+        assert len(glsk.read_cloud(tmp_path / "pipe.ply", sample=choice).points) == n
+    assert len(glsk.read_tensor_cloud(tmp_path / "pipe.ply", sample=700).point.positions) == 700
+    with pytest.raises(glsk.InvalidParameterError, match="sample"):
+        glsk.read_cloud(tmp_path / "pipe.ply", sample="all")
 
 
 def test_what_is_measured_on_the_surface_takes_the_sample(axis, tmp_path):
     found = glsk.analysis.assess(axis, PIPE)
     assert min(found.centredness, found.boundedness, found.topology) > 0.95
-    grasps = glsk.analysis.grasp_candidates(axis, 4.0)
+    grasps = grasp_candidates(axis, 4.0)
     glsk.save_skeleton(axis, tmp_path / "s.json")
-    read = glsk.read_skeleton(tmp_path / "s.json")  # which holds the vertices alone
-    with pytest.raises(glsk.InvalidParameterError, match="give its cloud"):
-        glsk.analysis.grasp_candidates(read, 4.0)
-    assert len(glsk.analysis.grasp_candidates(read, 4.0, cloud=PIPE)) == len(grasps) > 0
+    read = glsk.read_skeleton(tmp_path / "s.json")
+    for cloud in (None, PIPE):
+        assert len(grasp_candidates(read, 4.0, cloud=cloud)) == len(grasps) > 0
 
 
 def test_a_scene_of_meshes_is_sampled_before_it_is_cut_into_tiles(tmp_path):

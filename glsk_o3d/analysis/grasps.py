@@ -221,9 +221,7 @@ def _object(skeleton: Skeleton, cloud: Any) -> np.ndarray:
     if isinstance(cloud, tuple | list) and len(cloud) == 0:
         return np.empty((0, 3))
     whole = skeleton.whole
-    # of a mesh that was sampled, files hold the vertices alone
-    lost = skeleton.report.n_by_area > 0 and whole is skeleton
-    if cloud is None and (lost or len(whole.points) == 0):
+    if cloud is None and (skeleton.lacks_sample or len(whole.points) == 0):
         raise InvalidParameterError(
             "this skeleton has no points of the object: give its cloud (--cloud), or cloud=() to check nothing"
         )

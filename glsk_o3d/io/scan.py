@@ -14,6 +14,7 @@ import numpy as np
 from ..errors import InvalidParameterError, did_you_mean
 from ..interop.packages import import_open3d
 from ..points import on_surface
+from ..sampler import Sampler
 
 COLOR_CHANNELS = ["red", "green", "blue"]
 NORMAL_NAMES = ["nx", "ny", "nz"]
@@ -58,9 +59,9 @@ class Scan:
             triangles=triangles,
         )
 
-    def by_area(self) -> Scan:
-        """The points that stand for a mesh by default, see `Sampler`, with normals, and all else as a corner has it."""
-        places, corners, normals, _ = on_surface((self.positions, self.triangles))
+    def by_area(self, sample: Any = "auto") -> Scan:
+        """The points that stand for a mesh, see `Sampler.sample`, with normals, and all else as a corner has it."""
+        places, corners, normals, _ = on_surface((self.positions, self.triangles), Sampler(sample=sample).sample)
         return replace(self[corners[:, 0]], positions=places, normals=normals) if len(places) else self
 
     def chosen(self, where: str) -> np.ndarray:

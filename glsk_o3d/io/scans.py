@@ -5,7 +5,7 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -50,7 +50,9 @@ _SCAN_READERS: dict[str, Reader] = {
 }
 
 
-def read_cloud(path: str | os.PathLike[str], *, where: str | None = None) -> Any:
+def read_cloud(
+    path: str | os.PathLike[str], *, where: str | None = None, sample: int | Literal["auto", "vertices"] = "auto"
+) -> Any:
     """Read a point cloud, or points on a mesh: its vertices or, where `Sampler` would take one, a sample by area.
 
     All coordinates keep their digits.
@@ -63,6 +65,8 @@ def read_cloud(path: str | os.PathLike[str], *, where: str | None = None) -> Any
     where : str, optional
         Only points for which this holds, such as ``"classification in (2, 5) and z > 1.5"``: attributes and places,
         compared with numbers.
+    sample : int, "auto" or "vertices"
+        Points by area of a mesh, as `Sampler.sample`.
 
     Returns
     -------
@@ -76,7 +80,7 @@ def read_cloud(path: str | os.PathLike[str], *, where: str | None = None) -> Any
     FileFormatError
         A folder, a skeleton, an unknown ending, or a file that is empty, damaged, broken off, or without points.
     InvalidParameterError
-        `where` is no condition, or names a missing attribute.
+        `where` is no condition, or names a missing attribute; or `sample` is wrong.
     InvalidCloudError
         It holds for no point.
     MissingPackageError
@@ -90,15 +94,17 @@ def read_cloud(path: str | os.PathLike[str], *, where: str | None = None) -> Any
     ...     len(read_cloud(path, where="label == 2").points)
     2
     """
-    return read_scan(path, where).by_area().to_legacy()
+    return read_scan(path, where).by_area(sample).to_legacy()
 
 
-def read_tensor_cloud(path: str | os.PathLike[str], *, where: str | None = None) -> Any:
+def read_tensor_cloud(
+    path: str | os.PathLike[str], *, where: str | None = None, sample: int | Literal["auto", "vertices"] = "auto"
+) -> Any:
     """Read a cloud with all attributes of its points.
 
     Parameters
     ----------
-    path, where
+    path, where, sample
         As for `read_cloud`, which has the same errors.
 
     Returns
@@ -115,7 +121,7 @@ def read_tensor_cloud(path: str | os.PathLike[str], *, where: str | None = None)
     ...     read_tensor_cloud(f"{folder}/scan.csv").point.label.flatten().numpy()
     array([1, 2], dtype=int32)
     """
-    return read_scan(path, where).by_area().to_tensor()
+    return read_scan(path, where).by_area(sample).to_tensor()
 
 
 def read_scan(path: str | os.PathLike[str], where: str | None = None) -> Scan:

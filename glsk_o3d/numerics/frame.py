@@ -20,7 +20,7 @@ MIN_POINTS = 8  # derived: the least that can have rings of three and a curve
 MIN_EXTENT, MAX_EXTENT = 1e-120, 1e120  # derived: a float64 holds their squares and products
 MIN_STEPS = 1024  # derived: across the cloud, between which coordinates can choose: places in it then have three digits
 ROUNDINGS = 4e-15  # derived: a few roundings in the working frame
-SAME_POINT = 1e-4  # derived: distance of copies over that of the last neighbour; one random pair in 10^8 is as near
+SAME_POINT = 1e-4  # derived: distance of copies over that of other points; one random pair in 10^8 is as near
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,11 +92,11 @@ def to_working_frame(
     """Bring points (n, 3), each of which stands for `counts` (n,), into their working frame, see `Frame.of`.
 
     `k` says how many neighbours to look up for so many points; `neighbours` (n, k), if they are known, are those of
-    points that are all distinct. Copies are points much nearer to each other than to others; of each group the first
-    in Morton order stays. Returned are the frame; the m distinct points in Morton order (m, 3); which of the given
-    points they are (m,); for each given point its row among them; how many points each row stands for; and the
-    neighbours of each row. InvalidCloudError if fewer than 8 points are distinct, or if they are so far apart or so
-    near that squares overflow.
+    points that are all distinct. Copies are points much nearer to each other than to others; of each group the first in
+    Morton order stays. Returned are the frame; the m distinct points in Morton order (m, 3); which of the given points
+    they are (m,); for each given point its row among them; how many points each row stands for; and the neighbours of
+    each row. InvalidCloudError if fewer than 8 points are distinct, or if they are so far apart or so near that squares
+    overflow.
     """
     if len(points) < MIN_POINTS:
         raise InvalidCloudError(f"{len(points)} finite points: a skeleton needs at least {MIN_POINTS} distinct ones")
@@ -112,13 +112,10 @@ def to_working_frame(
         if neighbours is not None:
             return frame, cloud, kept, row, weight, row[neighbours[kept, : k(len(cloud))]]
         distance, near = nearest_neighbours(cloud, k(len(cloud)))
-        same = distance <= np.maximum(SAME_POINT * distance[:, -1:], ROUNDINGS)
-        same[:, 0] = False
-        if not same.any():
-            return frame, cloud, kept, row, weight, near
-        place, copy = np.nonzero(same)
-        group = component_labels(len(cloud), np.column_stack([place, near[place, copy]]))
+        group = _places(cloud, distance, near)
         first = np.unique(group, return_index=True)[1]
+        if len(first) == len(cloud):
+            return frame, cloud, kept, row, weight, near
         stays = np.zeros(len(cloud), bool)
         stays[first] = True
         merged = (np.cumsum(stays) - 1)[first[group]]
@@ -129,6 +126,23 @@ def to_working_frame(
         most = np.zeros(len(first))
         np.maximum.at(most, merged, weight)
         kept, row, weight = kept[stays], merged[row], most
+
+
+def _places(cloud: np.ndarray, distance: np.ndarray, near: np.ndarray) -> np.ndarray:
+    """The place of each point, (n,) int array: copies have one; `distance` and `near` (n, k) are to its neighbours.
+
+    Where these may all be copies, it is asked how far points in a square as wide as the middle half of the cloud are
+    apart. But if there are fewer places than copies in each, they are parts of an object, small and far away.
+    """
+    n, last = len(cloud), distance[:, -1:]
+    middle = np.ptp(np.quantile(cloud, (0.25, 0.75), axis=0), axis=0).max()  # of an outlier it knows nothing
+    for apart in (np.maximum(last, middle / np.sqrt(n)), last):
+        same = distance <= np.maximum(SAME_POINT * apart, ROUNDINGS)
+        place, copy = np.nonzero(same)
+        group = component_labels(n, np.column_stack([place, near[place, copy]])[place != near[place, copy]])
+        if group.max() ** 2 > n:
+            break
+    return group
 
 
 def check_extent(points: np.ndarray, n: int | None = None) -> None:

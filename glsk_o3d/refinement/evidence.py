@@ -207,7 +207,7 @@ def on_rows(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton, rows: np.n
     others = skeleton.vertex_of_point >= 0
     others[rows] = False
     others = np.flatnonzero(others)
-    if not len(others):
+    if not len(others) or not len(rows):
         return step(skeleton)
     points, vertex = skeleton.points[rows], skeleton.vertex_of_point[rows]
     made = step(replace(skeleton, points=points, normals=skeleton.normals[rows], vertex_of_point=vertex))

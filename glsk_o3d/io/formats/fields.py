@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...report import Report
-from ...skeleton import ARRAYS, Skeleton
+from ...skeleton import ARRAYS, Skeleton, of_input
 from ..paths import check_budget, check_promised
 
 FORMAT, FORMAT_VERSION = "glsk-o3d skeleton", 1
@@ -66,7 +66,8 @@ def dumps(value: Any) -> str:
 
 
 def _arrays(skeleton: Skeleton) -> dict[str, Any]:
-    return {"format": FORMAT, "format_version": FORMAT_VERSION, **{name: getattr(skeleton, name) for name in ARRAYS}}
+    arrays = {name: getattr(skeleton.whole, name) for name in ARRAYS}
+    return {"format": FORMAT, "format_version": FORMAT_VERSION, **arrays}
 
 
 def _decode(values: Any) -> Skeleton:
@@ -83,7 +84,7 @@ def _decode(values: Any) -> Skeleton:
         if kind is float and isinstance(values[name], list):
             with suppress(TypeError, ValueError, OverflowError):  # a skeleton says best what is wrong
                 arrays[name] = np.asarray(values[name], float)  # null is NaN, and words infinity
-    return Skeleton(**arrays, report=Report.from_dict(_with_nan(values["report"])))
+    return of_input(Skeleton(**arrays, report=Report.from_dict(_with_nan(values["report"]))))
 
 
 def _plain(value: Any) -> Any:

@@ -86,7 +86,7 @@ def _layout(stream: TextIO) -> Layout:
         if len(columns) >= 3:
             if not names and len(above) == len(words):
                 raise NoPoints(f"its columns are called {', '.join(above)}: call three of them x, y and z")
-            if names and delimiter == "," and len(words) == 2 * len(names):
+            if delimiter == "," and _has_decimal_commas(names, [line, *islice(stream, HEADER_LINES)]):
                 raise NoPoints(f"commas {AMBIGUOUS}")
             named = len(names) == len(words)
             return Layout(skip, delimiter, [names[i] for i in columns] if named else [], columns)
@@ -141,6 +141,14 @@ def _parted(line: str, delimiter: str | None) -> tuple[list[str], list[int]]:
     """The words of a line, and which of them are numbers."""
     words = [word.strip().strip("\"'") for word in line.split(delimiter)]
     return words, [i for i, word in enumerate(words) if _number(word, delimiter) is not None]
+
+
+def _has_decimal_commas(names: list[str], lines: list[str]) -> bool:
+    """Whether commas that part words are decimal points, too: more words than names, or zeros ahead of a number."""
+    rows = [_parted(line.strip().rstrip(","), ",")[0] for line in lines if "." not in line]
+    if names and len(rows) == len(lines):
+        return len(rows[0]) > len(names)
+    return not names and any(re.fullmatch(r"0\d+", word) for words in rows for word in words[1:4:2])
 
 
 def _number(word: str, delimiter: str | None) -> float | None:
