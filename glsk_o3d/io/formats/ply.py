@@ -28,7 +28,7 @@ from .graphs import NoEdges, graph_skeleton
 SECTION = ("half_width", "half_thickness")
 LONGEST_LINE = 1 << 16  # derived: far beyond any line of a header, so that an endless file without lines ends
 LONGEST_HEADER = 1 << 12  # derived: in lines, likewise
-COUNT_WIDTH = 20  # derived: digits of the largest 64-bit number: a header may be written before the count is known
+COUNT_WIDTH = 20  # derived: digits of the largest 64-bit number: another count fits in its place
 MORE_THAN_PROMISED = "it holds more than its header promises"
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _KINDS = {
@@ -353,6 +353,16 @@ def rows_of(columns: Mapping[str, np.ndarray]) -> np.ndarray:
     for name, values in columns.items():
         rows[name] = values
     return rows
+
+
+def append(path: Path, rows: np.ndarray, n: int) -> int:
+    """Add rows to the n that a file has, which is made for the first; gives how many it has, as its header says."""
+    n += len(rows)
+    with path.open("r+b" if n > len(rows) else "wb") as stream:
+        stream.write(header_of(rows.dtype, n, width=COUNT_WIDTH))
+        stream.seek(0, os.SEEK_END)
+        stream.write(rows.tobytes())
+    return n
 
 
 def header_of(row: np.dtype, n: int, *, width: int = 0, comment: str = "", more: str = "") -> bytes:
