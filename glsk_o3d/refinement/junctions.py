@@ -62,8 +62,8 @@ def move_junctions(skeleton: Skeleton) -> Skeleton:
         if merged is None:
             break
         skeleton = merged
-    handles = Handles(skeleton)
-    if handles.some:
+    if skeleton.n_loops and len(skeleton.supporting_points):
+        handles = Handles(skeleton)
         limbs = Limbs(skeleton, handles.bodies)
         places = _places(skeleton, limbs, known, handles)
     return _straightened(skeleton, limbs, places)
