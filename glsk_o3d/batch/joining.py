@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from ..analysis.comparison import matched
 from ..analysis.curves import along, pieces, simple_edges
 from ..numerics.groups import component_labels
+from ..numerics.paths import maximal_paths
 from ..numerics.vectors import dot, norm
 from ..skeleton import Skeleton
 from .grid import CUT_REACH, Grid, Tile
@@ -122,17 +123,10 @@ class Strands:
 
     def mended(self) -> Strands:
         """Without the vertices that were made in vain, in the middle of edges that went on."""
-        around = neighbours(self.edges)
-        vain = self.marks[:, MADE] & ~self.marks[:, [BORDER, INNER]].any(axis=1)
-        for at in np.flatnonzero(vain).tolist():
-            if len(around[at]) == 2:
-                one, other = around.pop(at)
-                around[one] = around[one] - {at} | {other}
-                around[other] = around[other] - {at} | {one}
-        edges = np.array([(a, b) for a in sorted(around) for b in sorted(around[a]) if a < b], np.int64).reshape(-1, 2)
-        kept = self.degree == 0
-        kept[list(around)] = True
-        return Strands(self.values, edges, self.marks)._compact(kept)
+        kept = ~self.marks[:, MADE] | self.marks[:, [BORDER, INNER]].any(axis=1) | (self.degree != 2)
+        paths = (np.compress(kept[path], path) for path, _ in maximal_paths(len(kept), self.edges))
+        links = [np.empty((0, 2), np.int64), *(np.stack([path[:-1], path[1:]], axis=1) for path in paths)]
+        return Strands(self.values, simple_edges(np.concatenate(links)), self.marks)._compact(kept)
 
     def _compact(self, kept: np.ndarray) -> Strands:
         number = np.cumsum(kept) - 1
