@@ -316,20 +316,14 @@ def triangles(faces: Table, n: int) -> np.ndarray:
 # ------------------------------------------------------------------------------------------------------------- writing
 
 
-def content(columns: Mapping[str, np.ndarray], triangles: np.ndarray | None = None) -> bytes:
-    """A file of vertices, columns by name, and of triangles, (T, 3) int array."""
-    vertices = rows_of(columns)
-    if triangles is None:
-        return header_of(vertices.dtype, len(vertices)) + vertices.tobytes()
-    faces = np.empty(len(triangles), [("n", "u1"), ("corners", "<i4", 3)])
-    faces["n"], faces["corners"] = 3, triangles
-    more = f"element face {len(faces)}\nproperty list uchar int vertex_indices\n"
-    return header_of(vertices.dtype, len(vertices), more=more) + vertices.tobytes() + faces.tobytes()
-
-
 def save(path: Path, held: Mapping[str, ArrayLike], triangles: ArrayLike | None = None) -> None:
-    """Write points with what `columns_of` takes, and triangles between them, as `write_atomically` does."""
-    data = content(columns_of(held), triangles if triangles is None else np.asarray(triangles))
+    """Write points with what `columns_of` takes, and triangles (T, 3) between them, as `write_atomically` does."""
+    vertices, corners, more = rows_of(columns_of(held)), np.asarray(() if triangles is None else triangles), ""
+    faces = np.empty(len(corners), [("n", "u1"), ("corners", "<i4", 3)])
+    if triangles is not None:
+        faces["n"], faces["corners"] = 3, corners
+        more = f"element face {len(faces)}\nproperty list uchar int vertex_indices\n"
+    data = header_of(vertices.dtype, len(vertices), more=more) + vertices.tobytes() + faces.tobytes()
     write_atomically(path, lambda temporary: temporary.write_bytes(data))
 
 
