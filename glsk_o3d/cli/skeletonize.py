@@ -43,6 +43,7 @@ def skeletonize(
     files with more than ten million points only a sample is read.
     """
     from .. import annotate_file
+    from ..analysis.summary import summary
     from ..interop.packages import require
     from ..io.streaming import LABELLED_ENDING, points_for
     from ..resampling import with_support
@@ -68,7 +69,10 @@ def skeletonize(
             comparing = "comparing with the skeleton of sample {} of {}"
             skeleton = with_support(skeleton, chosen, support, on_draw=lambda *n: update(comparing.format(*n), *n))
         files = write_each(results, skeleton, update)
-    _tell(skeleton, seconds, files)
+    facts, doubts = summary(skeleton, seconds), skeleton.report
+    supported = {"unsupported": list(map(asdict, doubts.unsupported))} if doubts.n_draws else {}
+    whole = {**facts, **supported, "warnings": list(doubts.warnings)}
+    tell(whole, lambda: print_rows(_shown(facts, skeleton)), files)
 
 
 def _save_tubes(skeleton: Skeleton, path: Path) -> None:
@@ -111,17 +115,6 @@ def _run(pipeline: Callable[..., Skeleton], cloud: Any, update: Callable[..., No
     start = time.perf_counter()
     skeleton = pipeline(cloud, on_iteration=on_iteration, on_stage=lambda stage: update(type(stage).__name__))
     return skeleton, time.perf_counter() - start
-
-
-def _tell(skeleton: Skeleton, seconds: float, files: Mapping[Path, str]) -> None:
-    """Print the summary of a run, and the files written; then OSError if there were problems."""
-    from ..analysis.summary import summary
-
-    report = skeleton.report
-    facts = summary(skeleton, seconds)
-    supported = {"unsupported": list(map(asdict, report.unsupported))} if report.n_draws else {}
-    whole = {**facts, **supported, "warnings": list(report.warnings)}
-    tell(whole, lambda: print_rows(_shown(facts, skeleton)), files)
 
 
 def _shown(facts: Mapping[str, Any], skeleton: Skeleton) -> dict[str, Any]:

@@ -120,8 +120,11 @@ class Verb:
         meanings = [f"{name} : {slot.facts['doc']}" for name, slot in self.slots.items()]
         return "\n".join([self.doc, "", *meanings])
 
-    def checked(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """The given parameters as they are taken; InvalidParameterError for a name or a value that is wrong."""
+    def plan(self, values: Mapping[str, Any]) -> Pipeline[Any]:
+        """The pipeline with such parameters; InvalidParameterError for a name or a value that is wrong.
+
+        So are those of a filter that is not in it.
+        """
         made = {}
         for name, value in values.items():
             if name not in self.slots:
@@ -130,11 +133,6 @@ class Verb:
                 made[name] = self.slots[name].checked(value)
             except ValueError as error:
                 raise InvalidParameterError(f"{name} = {value!r}: {error}") from None
-        return made
-
-    def plan(self, values: Mapping[str, Any]) -> Pipeline[Any]:
-        """The pipeline with such parameters; refuses those of a filter that is not in it."""
-        made = self.checked(values)
         names = {self.slots[name].option: name for name in made if self.slots[name].option}
         try:
             start = named_pipeline(made.get("pipeline", "default"))

@@ -197,10 +197,8 @@ def _refuse_gap(value: Any, path: str) -> None:
         raise RecipeError(f"{path}: a recipe cannot hold it: {value[UNWRITTEN]}")
 
 
-def _values(cls: type[Parameters], table: Any, path: str) -> dict[str, Any]:
+def _values(cls: type[Parameters], table: dict[str, Any], path: str) -> dict[str, Any]:
     """Parameters of a class, each checked."""
-    if not isinstance(table, dict):
-        raise RecipeError(f"{path}: must be a table of parameters, not {shown(table)}")
     fields = {field.name: field.metadata for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
     values = {}
     for name, value in table.items():

@@ -1,7 +1,5 @@
 """Follow handles to the body that they are on: those of a mug, a pot, a bucket."""
 
-from __future__ import annotations
-
 from functools import cached_property
 from typing import NamedTuple
 
