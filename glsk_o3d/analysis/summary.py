@@ -53,8 +53,6 @@ def iteration_rows(records: Iterable[IterationRecord]) -> list[list[str]]:
 def ending(facts: Mapping[str, Any]) -> str | None:
     """How a contraction ended, in a line, from what `summary` says of it; None where there was none.
 
-    Examples
-    --------
     >>> ending({"iterations": 4, "converged": True, "stop_reason": "explained score settled: De = 0.01 < 0.03"})
     'converged after 4 solves'
     >>> ending({"iterations": 1, "converged": False, "stop_reason": "reached max_iterations = 1"})

@@ -46,11 +46,6 @@ def move_junctions(skeleton: Skeleton) -> Skeleton:
     the junction. If two of them, or both ends of one, meet more than half the body's half width from the mean of its
     points, that is the junction's place. In a body without a junction, the vertex nearest to its middle takes that
     part. Points there belong to the vertex to which they are nearest, less its radius.
-
-    Returns
-    -------
-    Skeleton
-        With other places of the junctions and of the vertices beside them, perhaps fewer.
     """
     if not len(skeleton.junctions) and not skeleton.n_loops:
         return skeleton
