@@ -107,7 +107,7 @@ class Verb:
     name: str
     doc: str
     slots: dict[str, Slot]
-    makes: str  # what the result may be, as `check_ending` has it
+    makes: str  # what the result may be, as `layer_endings` has it
 
     @property
     def title(self) -> str:
@@ -185,8 +185,8 @@ def verbs() -> dict[str, Verb]:
     layer = Slot("layer", parameter(None, "The layer to act on; -1 is the current one.", type="int", low=-1).metadata)
     slots = {slot.name: slot for slot in (*_slots_of_all(), layer)}
     found = [
-        Verb("generate_curve_skeleton_glsk", whole, slots, "skeleton"),
-        SegmentVerb("generate_segmented_cloud_glsk", segmented, {"layer": layer}, "points or mesh"),
+        Verb("generate_curve_skeleton_glsk", whole, slots, "a skeleton"),
+        SegmentVerb("generate_segmented_cloud_glsk", segmented, {"layer": layer}, "points or a mesh"),
     ]
     return {verb.name: verb for verb in found}
 
