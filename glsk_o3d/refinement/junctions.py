@@ -97,16 +97,13 @@ def _places(
             near = np.linalg.norm(place - body.middle) < body.half_width / 2
             place = place if len(lines) > 2 and near else body.middle
         place = np.clip(place, low, high)  # normals that mean nothing may meet anywhere
-        known[name] = found[junction] = _Place(place, touching, [_entering(line, place) for line in lines])
+        for k, line in enumerate(lines):
+            if len(line.lead) > 1:  # a handle goes straight on through its body to the place nearest to the middle
+                wall = line.lead[:1]
+                way_in = wall + max((place - wall[0]) @ line.way, 0) * line.way
+                lines[k] = line._replace(lead=np.concatenate([way_in, line.lead]))
+        known[name] = found[junction] = _Place(place, touching, lines)
     return found
-
-
-def _entering(line: Line, place: np.ndarray) -> Line:
-    """A line with the way of a handle through its body: straight on to the place nearest to the middle."""
-    if len(line.lead) == 1:
-        return line
-    wall = line.lead[:1]
-    return line._replace(lead=np.concatenate([wall + max((place - wall[0]) @ line.way, 0) * line.way, line.lead]))
 
 
 def _merged(skeleton: Skeleton, limbs: Limbs, places: dict[int, _Place]) -> Skeleton | None:
