@@ -1,7 +1,5 @@
 """The driver: from a cloud to its skeleton in one call, and to the points that say most about it."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from typing import Any, TypeAlias

@@ -54,17 +54,7 @@ def parameter(
 
 
 def allowed_values(facts: Mapping[str, Any]) -> str:
-    """Type, unit and limits of a parameter in words, such as ``"'auto' or int [points], at least 4"``.
-
-    Parameters
-    ----------
-    facts : mapping
-        The metadata of a field made by `parameter`.
-
-    Returns
-    -------
-    str
-    """
+    """Type, unit and limits in words, such as ``"'auto' or int [points], at least 4"``, of a field's metadata."""
     kinds = [repr(choice) for choice in facts["choices"]]
     kinds += [facts["type"].replace("?", " or None")] * (facts["type"] != "choice")
     words = [" or ".join(kinds) + f" [{facts['unit']}]" * (facts["unit"] != "-")]

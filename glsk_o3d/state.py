@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from .interop.clouds import to_point_cloud
 from .numerics.rings import Rings
 from .numerics.vectors import Ints
 from .points import Representatives
@@ -105,6 +106,4 @@ class Contraction(Representatives):
 
     def to_point_cloud(self) -> Any:
         """The contracted points as an ``open3d.geometry.PointCloud``."""
-        from .interop.clouds import to_point_cloud
-
         return to_point_cloud(self.contracted)

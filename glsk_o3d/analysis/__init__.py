@@ -1,28 +1,5 @@
 """Measures of an object by its skeleton, and of a skeleton against a known axis or its cloud."""
 
-from .assessment import Assessment, assess
-from .branches import BranchTable, branch_table
-from .comparison import Comparison, Truth, compare
-from .forestry import TreeMeasures, tree_measures
-from .grasps import grasp_candidates
-from .gripper import GraspCandidates, Gripper
-from .segmentation import segment
-from .trees import Cylinders, cylinders
+import lazy_loader as _lazy
 
-__all__ = [
-    "Assessment",
-    "BranchTable",
-    "Comparison",
-    "Cylinders",
-    "GraspCandidates",
-    "Gripper",
-    "TreeMeasures",
-    "Truth",
-    "assess",
-    "branch_table",
-    "compare",
-    "cylinders",
-    "grasp_candidates",
-    "segment",
-    "tree_measures",
-]
+__getattr__, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InvalidParameterError
-from ..numerics.cycles import minimum_cycle_basis
+from ..numerics.cycles import edges_on_cycles
 from ..numerics.polylines import arc_lengths, place_at, relative_distance
 from ..numerics.vectors import Floats, Ints, norm
 from ..refinement.rooted import root_among
@@ -273,10 +273,8 @@ def _mean(values: np.ndarray, weights: np.ndarray) -> Any:
 
 def _kinds(skeleton: Skeleton, paths: list[np.ndarray]) -> np.ndarray:
     """The kind of every path, see `BranchTable`."""
-    cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
-    on_loops = {
-        frozenset(edge) for cycle in cycles for edge in zip(cycle.tolist(), np.roll(cycle, -1).tolist(), strict=True)
-    }
+    looped = skeleton.edges[edges_on_cycles(len(skeleton.vertices), skeleton.edges)]
+    on_loops = set(map(frozenset, looped.tolist()))
 
     def kind(path: np.ndarray) -> str:
         if len(path) == 1:

@@ -30,12 +30,7 @@ def fit_circle(points: np.ndarray) -> CircleFit | None:
     The start is the circle through three points from which the median distance of all is least (least median of
     squares, Rousseeuw 1984), of many triples drawn. From there the sum of the squared distances is minimised
     (Levenberg-Marquardt) over the points no farther than three standard deviations, until these stay the same. A few
-    points on another side do not count, where they would weigh most.
-
-    Returns
-    -------
-    CircleFit or None
-        None if there are fewer than four points on a circle.
+    points on another side do not count, where they would weigh most. None if there are fewer than four on a circle.
     """
     if len(points) < 4:
         return None

@@ -106,7 +106,9 @@ def grasp_candidates(
     blocked, opening, depth, seen = free_ways(ways, points, plane, middle, gripper, width, clearance)
     free, ways_left_out = _sorted_out(blocked)
     quality = quality[free // around] * (seen.ravel()[free] / 3 if len(points) else 1)
-    order = _in_rounds(free // around, quality.round(9))  # equal ones differ in their last digits
+    # the best of each place, then the second best of each; in each round the best first; equal ones in their order
+    best = np.argsort(-quality.round(9), kind="stable")
+    order = best[np.argsort(group_rank(free[best] // around, len(place)), kind="stable")]
     free, quality = free[order], quality[order]
     row = free // around
     candidates = GraspCandidates(
@@ -152,13 +154,6 @@ def _fitting(
     if short:
         left_out["branches without a place between their margins"] = short
     return place[some], branch[some], width[some], quality[some], left_out, len(place)
-
-
-def _in_rounds(place: np.ndarray, quality: np.ndarray) -> np.ndarray:
-    """The order in which grasps are listed: the best of each place, then the second best of each, and so on; in each
-    round the best first."""
-    best = np.argsort(-quality, kind="stable")
-    return best[np.argsort(group_rank(place[best], place.max(initial=-1) + 1), kind="stable")]
 
 
 def _sorted_out(reasons: dict[str, np.ndarray]) -> tuple[np.ndarray, dict[str, int]]:

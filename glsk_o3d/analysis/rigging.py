@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array
 
+from ..numerics.groups import group_rank
 from ..numerics.polylines import arc_lengths, incident_edges, nearest_on_edges, place_at
 from ..numerics.vectors import TINY, norm
 from ..refinement.merging import merge_into
@@ -160,9 +161,6 @@ def bone_before(forest: Skeleton) -> np.ndarray:
 
 def bone_names(forest: Skeleton) -> list[str]:
     """Of each bone: its branch, and which one of that it is."""
-    count: dict[int, int] = {}
-    names = []
-    for label in branch_of_edge(forest).tolist():
-        count[label] = count.get(label, -1) + 1
-        names.append(f"branch_{label}.{count[label]:03d}")
-    return names
+    branch = branch_of_edge(forest)
+    numbers = group_rank(branch, len(forest.branches)).tolist()
+    return [f"branch_{label}.{number:03d}" for label, number in zip(branch.tolist(), numbers, strict=True)]

@@ -1,14 +1,16 @@
 """Tables of arrays with a row per thing: to read, to iterate over, to write."""
 
+import csv
 import math
 import os
 from collections.abc import Iterator
 from dataclasses import fields
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
-from ..interop.atomic import write_csv
+from ..interop.atomic import write_atomically
 
 
 class Rows:
@@ -50,5 +52,10 @@ class Rows:
 
         The file appears complete or not at all; an OSError says why it does not.
         """
-        rows = (("" if isinstance(v, float) and not math.isfinite(v) else v for v in row.values()) for row in self)
-        write_csv(path, [*self._columns()], rows)
+        rows = [["" if isinstance(v, float) and not math.isfinite(v) else v for v in row.values()] for row in self]
+
+        def write(temporary: Path) -> None:
+            with temporary.open("w", newline="", encoding="utf-8", errors="replace") as stream:
+                csv.writer(stream, lineterminator="\n").writerows([self._columns(), *rows])
+
+        write_atomically(path, write)

@@ -26,20 +26,15 @@ ENDING_FACTS = ("iterations", "converged", "stop_reason")
 def summary(skeleton: Skeleton, seconds: float) -> dict[str, Any]:
     """A run in a few numbers."""
     report = skeleton.report
+
+    def counted(*names: str) -> dict[str, int]:
+        return {name: getattr(report, f"n_{name}") for name in names}
+
     return {
         "points": report.n_input,
-        "dropped": report.n_dropped,
-        "by_area": report.n_by_area,
-        "sampled": report.n_sampled,
-        "outliers": report.n_outliers,
-        "mixed": report.n_mixed,
-        "distinct": report.n_distinct,
-        "contracted": report.n_contracted,
+        **counted("dropped", "by_area", "sampled", "outliers", "mixed", "distinct", "contracted"),
         **structure(skeleton),
-        "loops_closed": report.n_loops_closed,
-        "cuts": report.n_cuts,
-        "bridges": report.n_bridges,
-        "traced": report.n_traced,
+        **counted("loops_closed", "cuts", "bridges", "traced"),
         "joined": len(report.joined),
         "uncertain": len(report.uncertain),
         **({"samples": report.n_draws, "agreeing": report.n_agreeing} if report.n_draws else {}),
@@ -58,8 +53,6 @@ def iteration_rows(records: Iterable[IterationRecord]) -> list[list[str]]:
 def ending(facts: Mapping[str, Any]) -> str | None:
     """How a contraction ended, in a line, from what `summary` says of it; None where there was none.
 
-    Examples
-    --------
     >>> ending({"iterations": 4, "converged": True, "stop_reason": "explained score settled: De = 0.01 < 0.03"})
     'converged after 4 solves'
     >>> ending({"iterations": 1, "converged": False, "stop_reason": "reached max_iterations = 1"})

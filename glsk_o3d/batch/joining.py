@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -13,6 +14,7 @@ from scipy.spatial import cKDTree
 from ..analysis.comparison import matched
 from ..analysis.curves import along, pieces, simple_edges
 from ..numerics.groups import component_labels
+from ..numerics.paths import maximal_paths
 from ..numerics.vectors import dot, norm
 from ..skeleton import Skeleton
 from .grid import CUT_REACH, Grid, Tile
@@ -122,17 +124,10 @@ class Strands:
 
     def mended(self) -> Strands:
         """Without the vertices that were made in vain, in the middle of edges that went on."""
-        around = neighbours(self.edges)
-        vain = self.marks[:, MADE] & ~self.marks[:, [BORDER, INNER]].any(axis=1)
-        for at in np.flatnonzero(vain).tolist():
-            if len(around[at]) == 2:
-                one, other = around.pop(at)
-                around[one] = around[one] - {at} | {other}
-                around[other] = around[other] - {at} | {one}
-        edges = np.array([(a, b) for a in sorted(around) for b in sorted(around[a]) if a < b], np.int64).reshape(-1, 2)
-        kept = self.degree == 0
-        kept[list(around)] = True
-        return Strands(self.values, edges, self.marks)._compact(kept)
+        kept = ~self.marks[:, MADE] | self.marks[:, [BORDER, INNER]].any(axis=1) | (self.degree != 2)
+        paths = (np.compress(kept[path], path) for path, _ in maximal_paths(len(kept), self.edges))
+        links = [np.empty((0, 2), np.int64), *(np.stack([path[:-1], path[1:]], axis=1) for path in paths)]
+        return Strands(self.values, simple_edges(np.concatenate(links)), self.marks)._compact(kept)
 
     def _compact(self, kept: np.ndarray) -> Strands:
         number = np.cumsum(kept) - 1
@@ -251,7 +246,6 @@ class _Joint:
     """What has been brought so far. Vertices are numbered through."""
 
     def __init__(self) -> None:
-        self._count = 0
         self._values = [np.empty((0, 8))]
         self._edges = [np.empty((0, 2), np.int64)]
         self._merged: list[tuple[int, int]] = []  # a cut end, and the earlier one that is the same place
@@ -262,8 +256,7 @@ class _Joint:
 
     def bring(self, strands: Strands, theirs: Samples | None) -> Samples:
         """Add what a tile brings, and join its inner cut ends to what others did; gives it as samples."""
-        first = self._count
-        self._count += len(strands.values)
+        first = sum(map(len, self._values))
         self._values.append(strands.values)
         self._edges.append(strands.edges + first)
         border, inner = strands.marks[:, BORDER], strands.marks[:, INNER]
@@ -319,10 +312,13 @@ def _stubs(values: np.ndarray, edges: np.ndarray, ends: np.ndarray) -> tuple[lis
     """Vertices of short limbs that end in a cut: on the other side they fork elsewhere; and the other cut ends."""
     gone: list[int] = []
     left: list[int] = []
-    around = neighbours(edges) if len(ends) else {}
+    around = defaultdict[int, set[int]](set)
+    for a, b in edges.tolist():
+        around[a].add(b)
+        around[b].add(a)
     for end in ends.tolist():
         path, length, longest = [end], 0.0, LONGEST_STUB * values[end, 5]
-        onward = around.get(end, set())
+        onward = around[end]
         while len(onward) == 1 and length <= longest:
             (at,) = onward
             length += float(norm(values[None, at, :3] - values[path[-1], :3])[0])
@@ -348,12 +344,3 @@ def inside(values: np.ndarray, low: np.ndarray, high: np.ndarray, by: np.ndarray
     """Which rows, whose first columns are x, y and z, lie in a box, so far from its faces at least, (n,) bool array."""
     places, by = values[:, :3], np.reshape(by, (-1, 1))
     return np.all((places >= low + by) & (places <= high - by), axis=1)
-
-
-def neighbours(edges: np.ndarray) -> dict[int, set[int]]:
-    """The vertices that edges join to each."""
-    around: dict[int, set[int]] = {}
-    for a, b in edges.tolist():
-        around.setdefault(a, set()).add(b)
-        around.setdefault(b, set()).add(a)
-    return around

@@ -14,9 +14,9 @@ import numpy as np
 from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.atomic import check_ends, write_json
 from ..io.formats import ply
-from ..io.scan import COLOR_CHANNELS, Scan
+from ..io.scan import COLOR_CHANNELS, NORMAL_NAMES, Scan
 from ..io.scans import read_blocks
-from ..numerics.frame import not_finite
+from ..io.streaming import finite_blocks
 from ..numerics.vectors import finite_rows
 from .grid import Grid, tile_name, tile_of
 
@@ -69,9 +69,7 @@ def divide(path: Path, folder: Path, cut: Cut, of: list[Any]) -> Split:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     try:
-        files = PartFiles(folder)
-        split = _divided(path, cut, of, files)
-        files.close()
+        split = _divided(path, folder, cut, of)
         write_json(folder / PARTS_FILE, asdict(split))
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
@@ -79,69 +77,40 @@ def divide(path: Path, folder: Path, cut: Cut, of: list[Any]) -> Split:
     return split
 
 
-class PartFiles:
-    """Parts of a scene written side by side as PLY, with normals and colours; coordinates keep all digits."""
+def add_to_parts(folder: Path, scan: Scan, rows: Mapping[str, np.ndarray], counts: Counter[str]) -> None:
+    """Append to each part, by its label, some points of a block: as PLY, with normals and colours.
 
-    def __init__(self, folder: Path):
-        self._folder, self._row = folder, np.dtype([])
-        self._counts: Counter[Path] = Counter()
-
-    def add(self, scan: Scan, rows: Mapping[str, np.ndarray]) -> None:
-        """Append to each part, by its label, some of the points of a block."""
-        columns: dict[str, np.ndarray] = dict(zip("xyz", scan.positions.astype("<f8").T, strict=True))
-        for names, values in ((("nx", "ny", "nz"), scan.normals), (COLOR_CHANNELS, scan.colors)):
-            if values is not None:
-                columns |= dict(zip(names, values.astype("<f4").T, strict=True))
-        table = ply.rows_of(columns)
-        self._row = table.dtype
-        for label, chosen in rows.items():
-            path = self._folder / f"{label}.ply"
-            with path.open("ab") as stream:
-                if path not in self._counts:
-                    stream.write(self._header(0))
-                stream.write(table[chosen].tobytes())
-            self._counts[path] += len(chosen)
-
-    def close(self) -> None:
-        """Put into every file how many points it has: before, it is an empty cloud with something behind it."""
-        for path, count in self._counts.items():
-            with path.open("r+b") as stream:
-                stream.write(self._header(count))
-
-    def _header(self, count: int) -> bytes:
-        return ply.header_of(self._row, count, width=ply.COUNT_WIDTH)
+    The counts are of the points that the parts have. Coordinates keep all digits.
+    """
+    columns: dict[str, np.ndarray] = dict(zip("xyz", scan.positions.astype("<f8").T, strict=True))
+    for names, values in ((NORMAL_NAMES, scan.normals), (COLOR_CHANNELS, scan.colors)):
+        if values is not None:
+            columns |= dict(zip(names, values.astype("<f4").T, strict=True))
+    table = ply.rows_of(columns)
+    for label, chosen in rows.items():
+        counts[label] = ply.append(folder / f"{label}.ply", table[chosen], counts[label])
 
 
-def _divided(path: Path, cut: Cut, of: list[Any], files: PartFiles) -> Split:
+def _divided(path: Path, folder: Path, cut: Cut, of: list[Any]) -> Split:
     """Hand out the points of a scene to the files of its parts, a block at a time."""
-    grid = _grid(path, cut)
-    labels: set[str] = set()
+    grid, counts = _grid(path, cut), Counter[str]()
     points = kept = 0
     for scan in map(Scan.by_area, read_blocks(path, where=cut.where)):
         points += len(scan)
         scan = scan[finite_rows(scan.positions)]
         kept += len(scan)
         rows = {tile_name(tile): chosen for tile, chosen in grid.parted(scan.positions)}
-        labels.update(rows)
-        if len(labels) > MOST_TILES:
-            raise InvalidParameterError(f"has {len(labels)} tiles or more: give larger ones")
-        files.add(scan, rows)
-    return Split(of, tuple(sorted(labels, key=tile_of)), points, points - kept, grid)
+        if (n := len(counts.keys() | rows.keys())) > MOST_TILES:
+            raise InvalidParameterError(f"has {n} tiles or more: give larger ones")
+        add_to_parts(folder, scan, rows, counts)
+    return Split(of, tuple(sorted(counts, key=tile_of)), points, points - kept, grid)
 
 
 def _grid(path: Path, cut: Cut) -> Grid:
     """The grid over the box of the points."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    points = invalid = first = 0
-    for scan in map(Scan.by_area, read_blocks(path, where=cut.where)):
-        finite = finite_rows(scan.positions)
-        if not (invalid or finite.all()):
-            first = points + int(np.argmin(finite))
-        points, invalid = points + len(scan), invalid + int(len(scan) - finite.sum())
-        low = np.minimum(low, scan.positions[finite].min(axis=0, initial=np.inf))
-        high = np.maximum(high, scan.positions[finite].max(axis=0, initial=-np.inf))
-    if invalid and not cut.drop_invalid:
-        raise not_finite(invalid, points, first)
+    for points in finite_blocks(path, cut.where, cut.drop_invalid):
+        low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
     if not (low <= high).all():
         raise InvalidCloudError("none of its points is finite")
     return Grid.over(low, high, cut.tiles, cut.overlap)

@@ -66,7 +66,7 @@ class LocalWorkers:
 @contextmanager
 def _inherited() -> Iterator[None]:
     """What a new process is to have before it imports anything: one BLAS thread, and Ctrl-C left to its parent."""
-    environment = {name: os.environ.get(name) for name in _ONE_THREAD}
+    before = {name: os.environ[name] for name in _ONE_THREAD if name in os.environ}
     os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
     signals = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if os.name == "posix" else None
     try:
@@ -74,11 +74,9 @@ def _inherited() -> Iterator[None]:
     finally:
         if signals is not None:
             signal.pthread_sigmask(signal.SIG_SETMASK, signals)
-        for name, value in environment.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+        for name in _ONE_THREAD:
+            os.environ.pop(name, None)
+        os.environ.update(before)
 
 
 def _begin() -> None:

@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from typer import Option
 
+from .. import batch as batches
 from . import options
 from .console import echo, flags, print_rows, progress, say
 from .options import SKELETON_ENDINGS, argument, option, output_option
 from .outputs import tell
-
-if TYPE_CHECKING:
-    from ..batch import BatchResult, Plan
 
 
 def batch(
@@ -48,7 +46,6 @@ def batch(
     A scan that fails does not stop the others. FOLDER/ledger.jsonl has a line for each; the same command again skips
     what is done, and tries again what failed or was in work at Ctrl-C. The exit code is 1 if a scan failed.
     """
-    from ..batch import plan_batch, run_batch
     from .overrides import choose
 
     what: dict[str, Any] = dict(
@@ -63,13 +60,13 @@ def batch(
         force=force,
     )
     if dry_run:
-        _tell_plan(plan_batch(inputs, output, **what))
+        _tell_plan(batches.plan_batch(inputs, output, **what))
         return
     with progress(remaining=True) as update:
         update("looking for what is done")
         watch = _Watch(update)
         what |= dict(workers=workers, scheduler=scheduler, on_plan=watch.begin, on_result=watch.step)
-        result = run_batch(inputs, output, **what)
+        result = batches.run_batch(inputs, output, **what)
     _tell_result(result, watch.left_out)
 
 
@@ -79,7 +76,7 @@ class _Watch:
     def __init__(self, update: Callable[..., None]) -> None:
         self._update, self._done = update, 0
 
-    def begin(self, plan: Plan) -> None:
+    def begin(self, plan: batches.Plan) -> None:
         self._total, self.left_out = len(plan.todo), plan.left_out
         _say_left_out(plan)
 
@@ -90,7 +87,7 @@ class _Watch:
             say("warning", f"{row['input']}: {row['error']}")
 
 
-def _tell_result(result: BatchResult, left_out: dict[str, str]) -> None:
+def _tell_result(result: batches.BatchResult, left_out: dict[str, str]) -> None:
     """Print what a batch did; BatchError if something failed."""
     from ..errors import BatchError
 
@@ -105,7 +102,7 @@ def _tell_result(result: BatchResult, left_out: dict[str, str]) -> None:
         raise BatchError(f"{len(failed)} of {len(rows)} scans failed: {result.ledger} says why")
 
 
-def _tell_plan(plan: Plan) -> None:
+def _tell_plan(plan: batches.Plan) -> None:
     def words() -> None:
         for task in plan.todo:
             echo(f"{task.source} ({task.why}) -> {', '.join(task.outputs)}")
@@ -117,7 +114,7 @@ def _tell_plan(plan: Plan) -> None:
     tell({**facts, "tasks": tasks, "left_out": plan.left_out}, words)
 
 
-def _say_left_out(plan: Plan) -> None:
+def _say_left_out(plan: batches.Plan) -> None:
     """Say how many files are not taken, and why; their names are in JSON."""
     for reason, n in Counter(plan.left_out.values()).items():
         if not flags.quiet:

@@ -6,7 +6,7 @@ import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import typer
@@ -16,16 +16,8 @@ from ..interop.atomic import writing
 UNBROKEN = 10**5  # more characters than a line of a table has
 
 
-@dataclass
-class Flags:
-    """What the command that runs was asked for, about its output."""
-
-    quiet: bool = False
-    verbose: bool = False
-    as_json: bool = False
-
-
-flags = Flags()
+flags = SimpleNamespace(quiet=False, verbose=False, as_json=False)
+"""What the command that runs was asked for, about its output."""
 
 
 def visible(text: str) -> str:

@@ -1,22 +1,15 @@
 """``glsk evaluate``: how good a skeleton is."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from ..errors import FileFormatError, InvalidParameterError, SkeletonWarning
 from .console import print_rows, progress
 from .options import SkeletonFile, argument, option
 from .outputs import tell
 from .reporting import WrongUsage
-
-if TYPE_CHECKING:
-    import numpy as np
-
-    from ..analysis import Assessment
 
 
 def evaluate(
@@ -34,6 +27,8 @@ def evaluate(
     1 is best. The comparison is with a truth: how far is it from the true axis, in radii? 0 is best of error, ends and
     radius error, 1 of the others; components, loops, leaves and junctions are more, or fewer, than it has.
     """
+    import numpy as np
+
     from .. import read_skeleton, read_truth
     from ..analysis import assess, compare
     from ..io.scans import read_scan
@@ -52,9 +47,13 @@ def evaluate(
             assessment = assess(curve, points) if comparison is None or curve.edge_lengths.any() else None
         except InvalidParameterError as error:  # the file's fault, not that of the command line
             raise FileFormatError(f"{skeleton}: {error}") from error
-    if assessment is not None and _elsewhere(assessment, curve.vertices, points):
-        message = "the skeleton does not lie in it: is this the cloud it was made from, in its units?"
-        warnings.warn(f"{cloud or skeleton}: {message}", SkeletonWarning, stacklevel=1)
+    if assessment is not None:
+        finite = points[np.isfinite(points).all(axis=1)]
+        whole, long = (np.linalg.norm(np.ptp(places, axis=0)) for places in (finite, curve.vertices))
+        # not inside, longer than the points, or very much shorter
+        if min(assessment.boundedness, assessment.centredness) < 0.1 or not 0.8 * long < whole < 20 * long:
+            message = "the skeleton does not lie in it: is this the cloud it was made from, in its units?"
+            warnings.warn(f"{cloud or skeleton}: {message}", SkeletonWarning, stacklevel=1)
     facts: dict[str, Any] = {
         **{"skeleton": str(skeleton), "cloud": cloud and str(cloud), "truth": truth and str(truth)},
         "assessment": assessment and asdict(assessment),
@@ -67,12 +66,3 @@ def evaluate(
                 print_rows(facts[name], title=name)
 
     tell(facts, words)
-
-
-def _elsewhere(assessment: Assessment, vertices: np.ndarray, points: np.ndarray) -> bool:
-    """Whether a skeleton can hardly be that of the points: it is not inside, longer than they, or very much shorter."""
-    import numpy as np
-
-    points = points[np.isfinite(points).all(axis=1)]
-    cloud, curve = (np.linalg.norm(np.ptp(places, axis=0)) for places in (points, vertices))
-    return min(assessment.boundedness, assessment.centredness) < 0.1 or not 0.8 * curve < cloud < 20 * curve

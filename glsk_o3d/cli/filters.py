@@ -1,20 +1,16 @@
 """``glsk filters``: what the code says about itself."""
 
-from __future__ import annotations
-
 import dataclasses
 import inspect
 import re
 from itertools import chain
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
+from ..parameters import Parameters, allowed_values
 from .console import echo, print_table
 from .options import argument
 from .outputs import tell
 from .reporting import WrongUsage
-
-if TYPE_CHECKING:
-    from ..parameters import Parameters
 
 
 def filters(
@@ -84,7 +80,5 @@ def _print(facts: dict[str, Any], *, full: bool) -> None:
 
 
 def _parameter_row(parameter: dict[str, Any]) -> tuple[str, str]:
-    from ..parameters import allowed_values
-
     default = "none" if parameter["default"] is None else parameter["default"]
     return f"  {parameter['name']}", f"{parameter['doc']}\n{allowed_values(parameter)}; default {default}"

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
+from .. import analysis
 from .console import echo, print_table, value_in_words
 from .options import argument, option, output_option
 from .outputs import Output, check_outputs, tell, write_each
-
-if TYPE_CHECKING:
-    from ..analysis import GraspCandidates
 
 GRASP_ENDINGS = (".json", ".csv")
 
@@ -31,14 +29,13 @@ def grasps(
     counts as free.
     """
     from .. import read_cloud, read_skeleton
-    from ..analysis import grasp_candidates
 
-    def save(best: GraspCandidates, path: Path) -> None:
+    def save(best: analysis.GraspCandidates, path: Path) -> None:
         {".json": best.to_json, ".csv": best.to_csv}[path.suffix.lower()](path)
 
     outputs = [Output(path, GRASP_ENDINGS, "grasps are JSON or CSV", save) for path in output or []]
     check_outputs(outputs, skeleton, cloud)
-    found = grasp_candidates(
+    found = analysis.grasp_candidates(
         read_skeleton(skeleton),
         opening,
         cloud=None if cloud is None else read_cloud(cloud),
@@ -50,7 +47,7 @@ def grasps(
     tell(facts, lambda: _print(best, len(found)), write_each(outputs, best))
 
 
-def _print(best: GraspCandidates, found: int) -> None:
+def _print(best: analysis.GraspCandidates, found: int) -> None:
     echo(f"{found} grasps at {best.places} places")
     for reason, times in best.left_out.items():
         limit = " (confidence below --min-confidence)" if reason == "uncertain" else ""

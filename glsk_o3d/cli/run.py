@@ -5,7 +5,6 @@ from typing import Annotated, Any
 
 from typer import Option
 
-from ..errors import FileFormatError
 from .console import echo, print_table, progress, value_in_words
 from .options import CutLoops, argument, output_option
 from .outputs import Output, check_outputs, tell, write_each
@@ -25,7 +24,7 @@ def run(
 
     The whole script is checked before anything is run. It needs pymeshlab.
     """
-    from ..meshlab.layers import check_ending
+    from ..meshlab.layers import layer_endings
     from ..meshlab.script import comment, scripts
     from ..meshlab.steps import find_script, read_steps
 
@@ -39,18 +38,13 @@ def run(
     from ..meshlab.meshset import MeshSet
 
     steps = read_steps(find_script(script))
-    makes = steps[-1].verb.makes if steps[-1].verb else "skeleton, points or mesh"
+    makes = steps[-1].verb.makes if steps[-1].verb else "a skeleton, points or a mesh"
     measures = steps[-1].name.startswith("get_")  # a script that ends in a measurement needs no file
-    try:
-        for path in output or []:
-            check_ending(path, makes)
-    except FileFormatError as error:
-        raise WrongUsage(str(error)) from None
 
     def save(layers: Any, path: Path) -> None:
         layers.layer().save(path, cut_loops=cut_loops)
 
-    outputs = [Output(path, ("",), makes, save) for path in output or []]
+    outputs = [Output(path, layer_endings(makes), f"last layer is {makes}", save) for path in output or []]
     check_outputs(outputs, scan, needed=None if measures else "an output with -o")
     with progress() as update:
         update(f"reading {scan.name}")

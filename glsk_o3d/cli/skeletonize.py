@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,7 +14,6 @@ from .options import option, output_option
 from .outputs import Output, check_outputs, skeleton_outputs, tell, write_each
 
 if TYPE_CHECKING:
-    from ..report import IterationRecord
     from ..skeleton import Skeleton
 
 
@@ -43,6 +42,7 @@ def skeletonize(
     files with more than ten million points only a sample is read.
     """
     from .. import annotate_file
+    from ..analysis.summary import summary
     from ..interop.packages import require
     from ..io.streaming import LABELLED_ENDING, points_for
     from ..resampling import with_support
@@ -63,12 +63,22 @@ def skeletonize(
         require("matplotlib")  # for the colours of branches
     with progress() as update:
         update(f"reading {scan.name}")
-        skeleton, seconds = _run(chosen, points_for(chosen, scan, where), update)
+        cloud, start = points_for(chosen, scan, where), time.perf_counter()
+        left = "solve {0.iteration}: {1} points are left"
+        skeleton = chosen(
+            cloud,
+            on_iteration=lambda record: update(left.format(record, record.n_points - record.n_merged)),
+            on_stage=lambda stage: update(type(stage).__name__),
+        )
+        seconds = time.perf_counter() - start
         if support is not None:
             comparing = "comparing with the skeleton of sample {} of {}"
             skeleton = with_support(skeleton, chosen, support, on_draw=lambda *n: update(comparing.format(*n), *n))
         files = write_each(results, skeleton, update)
-    _tell(skeleton, seconds, files)
+    facts, doubts = summary(skeleton, seconds), skeleton.report
+    supported = {"unsupported": list(map(asdict, doubts.unsupported))} if doubts.n_draws else {}
+    whole = {**facts, **supported, "warnings": list(doubts.warnings)}
+    tell(whole, lambda: print_rows(_shown(facts, skeleton)), files)
 
 
 def _save_tubes(skeleton: Skeleton, path: Path) -> None:
@@ -100,28 +110,6 @@ def demo(
         echo(f"wrote {folder / 'cloud.ply'}")
     outputs = [folder / "skeleton.ply", folder / "skeleton.json"]
     skeletonize(folder / "cloud.ply", outputs, preview=folder / "skeleton.png")
-
-
-def _run(pipeline: Callable[..., Skeleton], cloud: Any, update: Callable[..., None]) -> tuple[Skeleton, float]:
-    """Run a pipeline and show how far it is; gives the skeleton, and the seconds it took."""
-
-    def on_iteration(record: IterationRecord) -> None:
-        update(f"solve {record.iteration}: {record.n_points - record.n_merged} points are left")
-
-    start = time.perf_counter()
-    skeleton = pipeline(cloud, on_iteration=on_iteration, on_stage=lambda stage: update(type(stage).__name__))
-    return skeleton, time.perf_counter() - start
-
-
-def _tell(skeleton: Skeleton, seconds: float, files: Mapping[Path, str]) -> None:
-    """Print the summary of a run, and the files written; then OSError if there were problems."""
-    from ..analysis.summary import summary
-
-    report = skeleton.report
-    facts = summary(skeleton, seconds)
-    supported = {"unsupported": list(map(asdict, report.unsupported))} if report.n_draws else {}
-    whole = {**facts, **supported, "warnings": list(report.warnings)}
-    tell(whole, lambda: print_rows(_shown(facts, skeleton)), files)
 
 
 def _shown(facts: Mapping[str, Any], skeleton: Skeleton) -> dict[str, Any]:

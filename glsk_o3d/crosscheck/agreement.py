@@ -9,8 +9,7 @@ from ..numerics.cotangent import cotangent_laplacian
 from ..report import REFUSED, Report
 from ..skeleton import Skeleton
 from ..state import Contraction
-from .mesh import mesh_laplacian
-from .mesh_rings import umbrellas
+from .mesh import mesh_laplacian, umbrellas
 
 ANGLE_QUANTILES = {"median": 50, "p75": 75, "p90": 90}
 

@@ -1,4 +1,4 @@
-"""A mesh of a cloud, reconstructed by Open3D; its Laplacian by libigl; the skeleton it contracts to."""
+"""A mesh of a cloud, reconstructed by Open3D; its one-rings; its Laplacian by libigl; the skeleton it contracts to."""
 
 import time
 import warnings
@@ -18,14 +18,15 @@ from ..interop.packages import import_open3d, require
 from ..lpr_reducer import LPRReducer
 from ..numerics.cotangent import WEIGHT_CAP
 from ..numerics.frame import MIN_POINTS
+from ..numerics.groups import component_labels
 from ..numerics.neighbourhoods import nearest_neighbours
+from ..numerics.rings import Rings
 from ..numerics.vectors import dot
 from ..pipeline import Pipeline, with_stage
 from ..refiner import Refiner
 from ..report import Report
 from ..skeleton import Skeleton
 from ..state import Contraction, at_rest
-from .mesh_rings import clean_faces, mesh_rings
 
 BALL_RADII = (1.0, 2.0, 4.0)  # fitted: of the rolling balls, in spacings
 
@@ -120,3 +121,38 @@ def orient_normals(points: np.ndarray, normals: np.ndarray, edges: np.ndarray) -
     steps, _, root = dijkstra(tree, directed=False, indices=roots, min_only=True, return_predecessors=True)
     turned = (steps % 2 == 1) ^ (dot(normals, outward) < 0)[root]
     return np.where(turned[:, None], -normals, normals)
+
+
+def clean_faces(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Triangles with an area, each once, (g, 3) int64 array, in the order and with the orientation of their first copy.
+
+    Vertices without a triangle stay, so that rows keep their meaning.
+    """
+    faces = np.asarray(faces, np.int64).reshape(-1, 3)
+    first = np.sort(np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1])
+    a, b, c = points[faces[first]].transpose(1, 0, 2)
+    return faces[first[np.cross(b - a, c - a).any(axis=1)]]
+
+
+def umbrellas(n: int, faces: np.ndarray) -> np.ndarray:
+    """Vertices whose triangles make one closed umbrella, (n,) bool array: neither border nor fan of fans nor bare.
+
+    The faces, (f, 3) int array, are as from `clean_faces`.
+    """
+    corner = np.concatenate([faces, faces[:, [1, 2, 0]], faces[:, [2, 0, 1]]])  # each triangle from all its corners
+    ends = np.concatenate([corner[:, [0, 1]], corner[:, [0, 2]]])
+    spoke, row, count = np.unique(ends @ [n, 1], return_inverse=True, return_counts=True)
+    fan = component_labels(len(spoke), row.reshape(2, -1).T)  # spokes that triangles lead between are in one
+    odd = np.bincount(spoke // n, count != 2, n) > 0
+    vertex_of_fan = np.unique(np.column_stack([spoke // n, fan]), axis=0)[:, 0]
+    return ~odd & (np.bincount(vertex_of_fan, minlength=n) == 1)
+
+
+def mesh_rings(n: int, faces: np.ndarray) -> Rings:
+    """The neighbours of every vertex of a mesh of `clean_faces` as Rings; every vertex needs a face.
+
+    They are ascending, not in rotational order, since there may be none: `triangles` mean nothing.
+    """
+    edges = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)  # the sides of every triangle
+    centre, neighbour = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0).T
+    return Rings(np.searchsorted(centre, np.arange(n + 1)), neighbour, umbrellas(n, faces))

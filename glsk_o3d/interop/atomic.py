@@ -1,11 +1,10 @@
 """Files that are there to be read, and files that appear complete or not at all."""
 
-import csv
 import json
 import os
 import shutil
 import uuid
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -36,16 +35,6 @@ def write_json(path: str | os.PathLike[str], data: Any) -> None:
     """Write what JSON can hold, indented, as `write_atomically` does."""
     text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
-
-
-def write_csv(path: str | os.PathLike[str], names: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
-    """Write a table, a line of names and a line per row, as `write_atomically` does; None is left empty."""
-
-    def write(temporary: Path) -> None:
-        with temporary.open("w", newline="", encoding="utf-8", errors="replace") as stream:
-            csv.writer(stream, lineterminator="\n").writerows([names, *rows])
-
-    write_atomically(path, write)
 
 
 def write_atomically(path: str | os.PathLike[str], write: Callable[[Path], object]) -> None:

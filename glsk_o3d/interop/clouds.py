@@ -43,11 +43,10 @@ class SurfaceMesh(NamedTuple):
 
 def surface_mesh(cloud: Any) -> SurfaceMesh:
     """What `cloud_points` gives, and the triangles; InvalidCloudError also for one with a corner that is missing."""
-    points, held, tensor = cloud_points(cloud), (), open3d_class(cloud) == ("TriangleMesh", True)
-    if tensor and "indices" in cloud.triangle:
+    points, kind = cloud_points(cloud), open3d_class(cloud)
+    held = cloud.triangles if isinstance(cloud, SurfaceMesh) or kind == ("TriangleMesh", False) else ()
+    if kind == ("TriangleMesh", True) and "indices" in cloud.triangle:
         held = cloud.triangle.indices.cpu().numpy()
-    elif isinstance(cloud, SurfaceMesh) or (open3d_class(cloud)[0] == "TriangleMesh" and not tensor):
-        held = cloud.triangles
     triangles = np.asarray(held, np.int64).reshape(-1, 3)
     if not ((triangles >= 0) & (triangles < len(points))).all():
         raise InvalidCloudError(f"a triangle has a corner that is none of the {len(points)} vertices of its mesh")
@@ -102,10 +101,9 @@ def cloud_counts(cloud: Any, finite: np.ndarray) -> tuple[np.ndarray | None, int
     (n,) float array, the attribute ``sample_count`` of a tensor cloud, or those of CountedPoints, None if there are
     none; and two ints, the sums for the finite points and for all others. InvalidCloudError if they are no counts.
     """
-    if open3d_class(cloud) == ("PointCloud", True):
-        held = cloud.point[SAMPLE_COUNT].cpu().numpy() if SAMPLE_COUNT in cloud.point else None
-    else:
-        held = cloud.counts if isinstance(cloud, CountedPoints) else None
+    held = cloud.counts if isinstance(cloud, CountedPoints) else None
+    if open3d_class(cloud) == ("PointCloud", True) and SAMPLE_COUNT in cloud.point:
+        held = cloud.point[SAMPLE_COUNT].cpu().numpy()
     if held is None:
         return None, int(finite.sum()), int((~finite).sum())
     counts, n = held.astype(float), len(finite)

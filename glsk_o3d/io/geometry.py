@@ -10,6 +10,7 @@ from ..errors import InvalidParameterError
 from ..interop.packages import import_open3d
 from ..numerics.neighbourhoods import plane_axes
 from ..numerics.vectors import TINY
+from ..parameters import check_number
 from ..skeleton import Skeleton
 from .colors import ColorChoice, shades
 
@@ -80,10 +81,8 @@ def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float
     >>> to_tubes(skeletonize(torus(1000).points)).has_vertex_normals()
     True
     """
-    if isinstance(sides, bool) or not isinstance(sides, (int, np.integer)) or sides < 3:
-        raise InvalidParameterError(f"sides = {sides!r}: must be an int of at least 3")
-    if radius is not None and not (np.isfinite(radius) and radius > 0):
-        raise InvalidParameterError(f"radius = {radius!r}: must be a length above 0, in the cloud's units")
+    check_number("sides", sides, "int", low=3)
+    check_number("radius", radius, "float?", low=0, open_low=True)
     radii = skeleton.radii if radius is None else np.full(len(skeleton.vertices), float(radius))
     unknown = ~(np.isfinite(radii) & (radii >= 0))
     if unknown.any():

@@ -18,6 +18,7 @@ from ..sampler import Sampler
 
 COLOR_CHANNELS = ["red", "green", "blue"]
 NORMAL_NAMES = ["nx", "ny", "nz"]
+PER_POINT = ("positions", "colors", "normals")
 NO_TRIANGLES = np.empty((0, 3), np.int64)
 ALL_ROWS = sys.maxsize  # derived: more than any file has
 _SIGNS: dict[str, Callable[[Any, Any], Any]] = {
@@ -50,14 +51,9 @@ class Scan:
         triangles = NO_TRIANGLES
         if len(self.triangles) and rows.dtype == bool:
             triangles = (np.cumsum(rows) - 1)[self.triangles[rows[self.triangles].all(axis=1)]]
-        return replace(
-            self,
-            positions=self.positions[rows],
-            colors=None if self.colors is None else self.colors[rows],
-            normals=None if self.normals is None else self.normals[rows],
-            attributes={name: values[rows] for name, values in self.attributes.items()},
-            triangles=triangles,
-        )
+        attributes = {name: values[rows] for name, values in self.attributes.items()}
+        known = {name: values[rows] for name in PER_POINT if (values := getattr(self, name)) is not None}
+        return replace(self, **known, attributes=attributes, triangles=triangles)
 
     def by_area(self, sample: Any = "auto") -> Scan:
         """The points that stand for a mesh, see `Sampler.sample`, with normals, and all else as a corner has it."""

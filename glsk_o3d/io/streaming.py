@@ -1,7 +1,7 @@
 """Clouds larger than memory: a sample of a file to skeletonise, and labels from file to file."""
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -80,17 +80,7 @@ def _sampled(
 
     def blocks() -> Iterator[np.ndarray]:
         nonlocal dropped
-        at = first = dropped = 0
-        for block in map(Scan.by_area, read_blocks(path, where=where, bare=True)):
-            finite = finite_rows(block.positions)
-            if not (dropped or finite.all()):
-                first = at + int(np.argmin(finite))
-            dropped += len(finite) - int(finite.sum())
-            if finite.any():
-                yield block.positions if finite.all() else block.positions[finite]
-            at += len(block)
-        if dropped and not drop_invalid:
-            raise not_finite(dropped, at, first)
+        dropped = yield from finite_blocks(path, where, drop_invalid)
 
     if promised_points(path) is None:  # it is one block: no need to read it again and again
         whole = list(blocks())
@@ -100,6 +90,27 @@ def _sampled(
     if len(points) == 0:
         raise InvalidCloudError(f"{os.fspath(path)}: there is no point with finite coordinates")
     return points, counts, dropped
+
+
+def finite_blocks(
+    path: str | os.PathLike[str], where: str | None, drop_invalid: bool
+) -> Generator[np.ndarray, None, int]:
+    """The finite points of a file, those by area of a mesh, in (m, 3) arrays; returns how many others it has.
+
+    InvalidCloudError in the end if there are some, unless these are to be dropped.
+    """
+    at = first = dropped = 0
+    for block in map(Scan.by_area, read_blocks(path, where=where, bare=True)):
+        finite = finite_rows(block.positions)
+        if not (dropped or finite.all()):
+            first = at + int(np.argmin(finite))
+        dropped += len(finite) - int(finite.sum())
+        if finite.any():
+            yield block.positions if finite.all() else block.positions[finite]
+        at += len(block)
+    if dropped and not drop_invalid:
+        raise not_finite(dropped, at, first)
+    return dropped
 
 
 def points_for(pipeline: Pipeline[Any], path: str | os.PathLike[str], where: str | None = None) -> Any:
@@ -172,18 +183,10 @@ def annotate_file(
 
     def write(temporary: Path) -> None:
         nonlocal n
-        row = np.dtype([])
-        with temporary.open("wb") as stream:
-            for block in read_blocks(path, where=where):
-                vertex = vertex_of_cloud(skeleton, block.positions)[1]
-                table = ply.rows_of(_columns(block, labels(skeleton, block.positions, vertex, "branch")))
-                if not n:
-                    row = table.dtype
-                    stream.write(ply.header_of(row, n, width=ply.COUNT_WIDTH))
-                n += len(table)
-                stream.write(table.tobytes())
-            stream.seek(0)
-            stream.write(ply.header_of(row, n, width=ply.COUNT_WIDTH))
+        for block in read_blocks(path, where=where):
+            vertex = vertex_of_cloud(skeleton, block.positions)[1]
+            found = labels(skeleton, block.positions, vertex, "branch")
+            n = ply.append(temporary, ply.rows_of(_columns(block, found)), n)
 
     write_atomically(output, write)
     return n

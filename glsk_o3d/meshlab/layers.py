@@ -10,18 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FileFormatError, InvalidCloudError, InvalidParameterError
-from ..interop.atomic import write_atomically
+from ..errors import InvalidCloudError, InvalidParameterError
+from ..interop.atomic import check_ending, write_atomically
 from ..interop.clouds import SurfaceMesh, surface_mesh
 from ..interop.packages import require
 from ..io.formats import ply
 from ..io.formats.graphs import graph_skeleton
 from ..io.scans import read_scan
-from ..io.skeletons import save_skeleton, skeleton_ending
+from ..io.skeletons import FORMATS, save_skeleton
 from ..skeleton import Skeleton
 
-LAYER_ENDINGS = {"points": (".ply", ".xyz"), "mesh": (".ply",)}
-"""What layers without edges are written as."""
+LAYER_ENDINGS = {"skeleton": tuple(FORMATS), "points": (".ply", ".xyz"), "mesh": (".ply",)}
+"""What layers are written as."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +149,8 @@ class Layer:
         if self.is_skeleton:
             save_skeleton(self.to_skeleton(), path, **options)
             return
-        check_ending(path, "points" if self.faces is None else "points or mesh")
+        what = "points" if self.faces is None else "points or a mesh"
+        check_ending(path, f"layer is {what}", *layer_endings(what))
         if path.suffix.lower() == ".xyz":
             write_atomically(path, lambda file: np.savetxt(file, self.vertices, "%.17g"))
             return
@@ -159,18 +160,10 @@ class Layer:
         ply.save(path, held, self.faces if self.faces is not None and len(self.faces) else None)
 
 
-def check_ending(path: Path, what: str) -> None:
-    """Raise FileFormatError unless the ending is that of a format for such a layer.
-
-    `what` it may be is "skeleton", "points", "points or mesh", or "skeleton, points or mesh".
-    """
-    known = [ending for kind, endings in LAYER_ENDINGS.items() if kind in what for ending in endings]
-    if path.suffix.lower() in known:
-        return
-    if "skeleton" in what:
-        skeleton_ending(path)
-    else:
-        raise FileFormatError(f"{path}: unknown ending for {what}; known are {', '.join(dict.fromkeys(known))}")
+def layer_endings(what: str) -> tuple[str, ...]:
+    """Endings of files for such a layer: "a skeleton", "points", "points or a mesh", "a skeleton, points or a mesh"."""
+    known = (ending for kind, endings in LAYER_ENDINGS.items() if kind in what for ending in endings)
+    return tuple(dict.fromkeys(known))
 
 
 def to_pymeshlab(skeleton: Skeleton) -> Any:

@@ -107,7 +107,7 @@ class Verb:
     name: str
     doc: str
     slots: dict[str, Slot]
-    makes: str  # what the result may be, as `check_ending` has it
+    makes: str  # what the result may be, as `layer_endings` has it
 
     @property
     def title(self) -> str:
@@ -120,8 +120,11 @@ class Verb:
         meanings = [f"{name} : {slot.facts['doc']}" for name, slot in self.slots.items()]
         return "\n".join([self.doc, "", *meanings])
 
-    def checked(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """The given parameters as they are taken; InvalidParameterError for a name or a value that is wrong."""
+    def plan(self, values: Mapping[str, Any]) -> Pipeline[Any]:
+        """The pipeline with such parameters; InvalidParameterError for a name or a value that is wrong.
+
+        So are those of a filter that is not in it.
+        """
         made = {}
         for name, value in values.items():
             if name not in self.slots:
@@ -130,11 +133,6 @@ class Verb:
                 made[name] = self.slots[name].checked(value)
             except ValueError as error:
                 raise InvalidParameterError(f"{name} = {value!r}: {error}") from None
-        return made
-
-    def plan(self, values: Mapping[str, Any]) -> Pipeline[Any]:
-        """The pipeline with such parameters; refuses those of a filter that is not in it."""
-        made = self.checked(values)
         names = {self.slots[name].option: name for name in made if self.slots[name].option}
         try:
             start = named_pipeline(made.get("pipeline", "default"))
@@ -187,8 +185,8 @@ def verbs() -> dict[str, Verb]:
     layer = Slot("layer", parameter(None, "The layer to act on; -1 is the current one.", type="int", low=-1).metadata)
     slots = {slot.name: slot for slot in (*_slots_of_all(), layer)}
     found = [
-        Verb("generate_curve_skeleton_glsk", whole, slots, "skeleton"),
-        SegmentVerb("generate_segmented_cloud_glsk", segmented, {"layer": layer}, "points or mesh"),
+        Verb("generate_curve_skeleton_glsk", whole, slots, "a skeleton"),
+        SegmentVerb("generate_segmented_cloud_glsk", segmented, {"layer": layer}, "points or a mesh"),
     ]
     return {verb.name: verb for verb in found}
 

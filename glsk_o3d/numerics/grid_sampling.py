@@ -138,7 +138,7 @@ def sample_grid(points: np.ndarray, n: int) -> Sample:
         return rows[middle], weight
 
     parts = np.searchsorted(begin, range(0, len(code) + GRID_CHUNK, GRID_CHUNK)).clip(max=len(begin) - 1)
-    found = in_threads(middles, pairwise(_distinct(parts).tolist()))
+    found = in_threads(middles, pairwise(np.unique(parts).tolist()))
     kept, weight = (np.concatenate(each) for each in zip(*found, strict=True))
     representative = np.empty(len(points), int)
     representative[order] = np.repeat(np.arange(len(kept)), np.diff(begin))
@@ -172,11 +172,6 @@ def _nearest_to(
     return rows, squared[rows]
 
 
-def _distinct(ordered: np.ndarray) -> np.ndarray:
-    """Each number of an ascending array once."""
-    return ordered[_begins(ordered)]
-
-
 def _begins(ordered: np.ndarray) -> np.ndarray:
     """Where each run of equal numbers begins."""
     return np.flatnonzero(np.append(True, ordered[1:] != ordered[:-1]))
@@ -208,16 +203,11 @@ def sample_blocks(blocks: Blocks, size: Callable[[int], int]) -> tuple[np.ndarra
 
 def _fineness(blocks: Blocks, grid: Grid, n: int) -> float:
     """Cells along the grid for about n to be occupied."""
-
-    def occupied(points: np.ndarray) -> np.ndarray:
-        return _distinct(np.sort(grid.codes(points, FINEST_CELLS)))
-
     codes, bits = np.empty(0, np.uint64), MORTON_BITS
-    for found in in_threads(occupied, blocks(), BLOCK_THREADS):
-        found = _distinct(found >> np.uint64(3 * (MORTON_BITS - bits)))
-        codes = _distinct(np.sort(np.concatenate([codes, found])))
+    for found in in_threads(lambda points: np.unique(grid.codes(points, FINEST_CELLS)), blocks(), BLOCK_THREADS):
+        codes = np.unique(np.concatenate([codes, found >> np.uint64(3 * (MORTON_BITS - bits))]))
         while len(codes) > CELLS_KEPT * n:
-            codes, bits = _distinct(codes >> np.uint64(3)), bits - 1
+            codes, bits = np.unique(codes >> np.uint64(3)), bits - 1
     return cells_along(codes, bits, n)
 
 

@@ -61,7 +61,10 @@ def join_pieces(places: np.ndarray, links: csr_matrix, longest: np.ndarray) -> t
     added = np.empty((0, 2), int)
     piece = connected_components(links, directed=False)[1]
     _, neighbour = nearest_neighbours(places, min(LINK_NEIGHBOURS + 1, len(places)))
-    outward = _outward(places, links)
+    near = steps(links) @ steps(links)
+    near.data[:] = 1
+    # from the mean of what is within two links of a place to it: where it goes on if it is an end
+    outward = unit(places - (near @ places) / np.diff(near.indptr)[:, None])
     while piece.max() > 0:
         row, column = np.nonzero(piece[neighbour] != piece[:, None])
         ends = np.column_stack([row, neighbour[row, column]])
@@ -74,8 +77,8 @@ def join_pieces(places: np.ndarray, links: csr_matrix, longest: np.ndarray) -> t
         ends = np.concatenate([ends, *(pair[None] for pair in some)])
         way = places[ends[:, 1]] - places[ends[:, 0]]
         length = norm(way)
-        near = length <= longest[ends].max(axis=1)
-        ends, way, length = ends[near], way[near], length[near]
+        short = length <= longest[ends].max(axis=1)
+        ends, way, length = ends[short], way[short], length[short]
         if len(ends) == 0:
             break
         ahead = np.maximum(dot(outward[ends[:, 0]], way), -dot(outward[ends[:, 1]], way)) / np.maximum(length, TINY)
@@ -84,14 +87,6 @@ def join_pieces(places: np.ndarray, links: csr_matrix, longest: np.ndarray) -> t
         piece = component_labels(int(piece.max()) + 1, piece[fresh])[piece]
     row, column = links.nonzero()
     return linked(places, np.concatenate([np.column_stack([row, column]), added])), added
-
-
-def _outward(places: np.ndarray, links: csr_matrix) -> np.ndarray:
-    """Unit vectors from the mean of what is within two links of every place to it: where it goes on if it is an end."""
-    step = steps(links)
-    near = step @ step
-    near.data[:] = 1
-    return unit(places - (near @ places) / np.diff(near.indptr)[:, None])
 
 
 def steps(links: csr_matrix) -> csr_matrix:

@@ -118,11 +118,9 @@ def _stacked(
     laplacian: csr_matrix, row_weight: np.ndarray, position_weight: np.ndarray, place: np.ndarray
 ) -> csr_array:
     """The rows of W_L L, and below them W_H; every unknown has its place among the columns."""
-    n = len(position_weight)
-    data = np.concatenate([np.repeat(row_weight, np.diff(laplacian.indptr)) * laplacian.data, position_weight])
-    columns = place.astype(laplacian.indices.dtype)
-    indices = np.concatenate([columns[laplacian.indices], columns])
-    indptr = np.concatenate(
-        [laplacian.indptr, laplacian.indptr[-1] + np.arange(1, n + 1, dtype=laplacian.indptr.dtype)]
-    )
-    return csr_array((data, indices, indptr), shape=(2 * n, n))
+    n, (indices, starts) = len(place), (laplacian.indices, laplacian.indptr)
+    data = np.concatenate([np.repeat(row_weight, np.diff(starts)) * laplacian.data, position_weight])
+    columns = place.astype(indices.dtype)
+    ends = starts[-1] + np.arange(1, n + 1, dtype=starts.dtype)
+    rows = np.concatenate([columns[indices], columns]), np.concatenate([starts, ends])
+    return csr_array((data, *rows), shape=(2 * n, n))

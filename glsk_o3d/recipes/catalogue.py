@@ -25,11 +25,6 @@ def catalogue() -> dict[str, type[Parameters]]:
     return dict(sorted(known.items(), key=lambda item: not issubclass(item[1], Filter)))
 
 
-def find(name: str) -> type[Parameters] | None:
-    """The filter or stopping rule of that name, if there is one; plugins are only loaded for names of their own."""
-    return BUILTIN.get(name) or catalogue().get(name)
-
-
 def serves(cls: type[Parameters], kind: str) -> bool:
     """Whether an instance can be a parameter of the type ``"reducer"`` or ``"stop"``, or a stage: ``"filter"``."""
     if not issubclass(cls, Filter):

@@ -11,7 +11,8 @@ from ..errors import RecipeError, did_you_mean
 from ..interop.atomic import existing_file, write_json
 from ..parameters import FROM, NONE, UNWRITTEN, Parameters, problem_with, shown
 from ..pipeline import RECIPE_VERSION, Pipeline, recipe_of
-from .catalogue import catalogue, find, serves
+from ..pipelines import BUILTIN
+from .catalogue import catalogue, serves
 
 RECIPE_ENDING = ".json"
 """Of files that hold recipes."""
@@ -179,7 +180,9 @@ def _part(table: Any, path: str, role: str) -> Parameters:
     if not isinstance(table, dict) or kind not in table:
         raise RecipeError(f'{path}: must be a table such as {{"{kind}": NAME, ...}}, not {shown(table)}')
     name = table[kind]
-    cls, origin = find(name) if isinstance(name, str) else None, table.get(FROM)
+    # plugins are only loaded for names of their own
+    cls = BUILTIN.get(name) or catalogue().get(name) if isinstance(name, str) else None
+    origin = table.get(FROM)
     if cls is None or not serves(cls, role):
         fitting = [other for other, its in catalogue().items() if serves(its, role)]
         message = did_you_mean(str(name), fitting, role.replace("stop", "stopping rule"))
@@ -197,10 +200,8 @@ def _refuse_gap(value: Any, path: str) -> None:
         raise RecipeError(f"{path}: a recipe cannot hold it: {value[UNWRITTEN]}")
 
 
-def _values(cls: type[Parameters], table: Any, path: str) -> dict[str, Any]:
+def _values(cls: type[Parameters], table: dict[str, Any], path: str) -> dict[str, Any]:
     """Parameters of a class, each checked."""
-    if not isinstance(table, dict):
-        raise RecipeError(f"{path}: must be a table of parameters, not {shown(table)}")
     fields = {field.name: field.metadata for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
     values = {}
     for name, value in table.items():

@@ -311,7 +311,7 @@ def _replanted(skeleton: Skeleton, grown: list[_Grown]) -> Skeleton:
     members = Members(skeleton.vertex_of_point, m)  # those without a normal, too
     keep, owner = np.ones(m, bool), skeleton.vertex_of_point.copy()
     low, high = axis_box(skeleton.points[skeleton.supporting_points])
-    edges, radii, confidence = [skeleton.edges], [skeleton.radii], [skeleton.confidence]
+    edges, known = [skeleton.edges], {name: [getattr(skeleton, name)] for name in ("radii", "confidence")}
     planted = [np.clip(found.places, low, high) for found in grown]
     for (path, cut, _, run), places in zip(grown, planted, strict=True):
         gone, names = path[cut:], m + np.arange(len(places))
@@ -319,21 +319,17 @@ def _replanted(skeleton: Skeleton, grown: list[_Grown]) -> Skeleton:
         keep[gone] = False
         chain = np.concatenate([path[cut - 1 : cut], names])
         edges.append(np.column_stack([chain[:-1], chain[1:]]))
-        radii.append(np.full(len(places), quantile(skeleton.radii[run])))
-        confidence.append(np.full(len(places), quantile(skeleton.confidence[run])))
+        for values in known.values():
+            values.append(np.full(len(places), quantile(values[0][run])))
         lost = members.of(gone)
         near = cKDTree(np.concatenate([skeleton.vertices[chain[:1]], places])).query(skeleton.points[lost])[1]
         owner[lost] = chain[near]
     keep = np.concatenate([keep, np.ones(m - len(keep), bool)])
     number, links = np.cumsum(keep) - 1, np.concatenate(edges)
     links = number[links[keep[links].all(axis=1)]]
-    made = dict(
-        vertices=np.concatenate([skeleton.vertices, *planted])[keep],
-        edges=links,
-        radii=np.concatenate(radii)[keep],
-        confidence=np.concatenate(confidence)[keep],
-        vertex_of_point=np.append(number, -1)[owner],
-    )
+    known["vertices"] = [skeleton.vertices, *planted]
+    made = {name: np.concatenate(values)[keep] for name, values in known.items()}
+    made |= dict(edges=links, vertex_of_point=np.append(number, -1)[owner])
     replanted = replace(skeleton, **NOT_MEASURED | made)
     section = measure_sections(replanted).radius
     new = np.flatnonzero(keep) >= len(skeleton.vertices)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -15,7 +15,7 @@ from ..numerics.groups import first_in_their_place, group_rank
 from ..numerics.morton import morton_order
 from ..numerics.neighbourhoods import nearest_neighbours, uprightness
 from ..numerics.polylines import incident_edges, nearest_on_edges, places_on_edges
-from ..numerics.vectors import TINY, dot, finite_rows
+from ..numerics.vectors import TINY, dot
 from ..numerics.winding import AREA_NEIGHBOURS, orient_from_axis, point_areas, winding_number
 from ..skeleton import Skeleton
 from .merging import with_fields
@@ -181,6 +181,8 @@ def on_sample(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skele
     points are taken, since their mean is what is known of the surface.
     """
     rows, m = skeleton.surface_points, len(skeleton.vertices)
+    if not len(rows):
+        return step(skeleton)
     clean = 1 - skeleton.report.noise
     if len(rows) * clean > REFINED_POINTS:
         rows = rows[morton_order(skeleton.points[rows])]
@@ -199,7 +201,7 @@ def on_distinct(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Ske
 
 
 def on_rows(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton, rows: np.ndarray) -> Skeleton:
-    """What a step makes of a skeleton with some of its input points alone, `rows` (n,).
+    """What a step makes of a skeleton with some of its input points alone, `rows` (n,), in their order.
 
     In the result a point that had a vertex has that of its stand-in, and one that is its own that of the nearest of
     these points.
@@ -207,10 +209,8 @@ def on_rows(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton, rows: np.n
     others = skeleton.vertex_of_point >= 0
     others[rows] = False
     others = np.flatnonzero(others)
-    if not len(others) or not len(rows):
-        return step(skeleton)
     points, vertex = skeleton.points[rows], skeleton.vertex_of_point[rows]
-    made = step(replace(skeleton, points=points, normals=skeleton.normals[rows], vertex_of_point=vertex))
+    made = step(with_fields(skeleton, points=points, normals=skeleton.normals[rows], vertex_of_point=vertex))
     owner, normals = np.full(len(skeleton.points), -1), skeleton.normals.copy()
     owner[rows], normals[rows] = made.vertex_of_point, made.normals
     stand_ins = skeleton.stand_ins[others]
@@ -229,17 +229,8 @@ def in_order(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skelet
     That would show in the last digit of sums, and where one thing is as good as another, as on grids, it decides. In
     the result the points are as they came.
     """
-    finite = finite_rows(skeleton.points)
-    some = np.flatnonzero(finite)
-    if len(some):
-        some = some[morton_order(skeleton.points[some])]
-    order = np.concatenate([some, np.flatnonzero(~finite)])
-    back = np.empty_like(order)
-    back[order] = np.arange(len(order))
-    vertex, normals = skeleton.vertex_of_point[order], skeleton.normals.take(order, axis=0)
-    made = step(with_fields(skeleton, points=skeleton.points[order], normals=normals, vertex_of_point=vertex))
-    vertex, normals = made.vertex_of_point[back], made.normals.take(back, axis=0)
-    return with_fields(made, points=skeleton.points, normals=normals, vertex_of_point=vertex)
+    rows = np.flatnonzero(skeleton.vertex_of_point >= 0)
+    return on_rows(step, skeleton, rows[morton_order(skeleton.points[rows])] if len(rows) else rows)
 
 
 def _nearest_edges(skeleton: Skeleton, supporting: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

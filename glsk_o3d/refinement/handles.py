@@ -1,7 +1,5 @@
 """Follow handles to the body that they are on: those of a mug, a pot, a bucket."""
 
-from __future__ import annotations
-
 from functools import cached_property
 from typing import NamedTuple
 
@@ -16,7 +14,7 @@ from ..skeleton import Skeleton
 from .axis_fit import FIT_STAY
 from .diagnostics import STUB_LENGTH
 from .limbs import AXIS_LEAVES, AXIS_LENGTH, Line
-from .sections import SURFACE_FIT, Sections, VertexPoints, half_axes, measure_sections, normal_moments
+from .sections import SURFACE_FIT, VertexPoints, half_axes, measure_sections, normal_moments
 from .wide_ends import WIDE_NECK, half_widths
 
 HANDLE_STEP = 0.7  # precision: radii from one section to the next; with .3 and .5 the scores are the same
@@ -36,27 +34,11 @@ class Body(NamedTuple):
 
 
 class Handles:
-    """The handles of a skeleton: thin parts of loops, each next to a body at least three times as wide."""
+    """The handles of a skeleton with points: thin parts of loops, each next to a body at least three times as wide."""
 
     def __init__(self, skeleton: Skeleton) -> None:
-        self.skeleton, self.cloud = skeleton, VertexPoints(skeleton)
-
-    @cached_property
-    def some(self) -> bool:
-        """Whether there may be any."""
-        return self.skeleton.n_loops > 0 and len(self.cloud.points) > 0
-
-    @cached_property
-    def _width(self) -> Floats:
-        return half_widths(self.cloud, self._sections)
-
-    @cached_property
-    def _sections(self) -> Sections:
-        return measure_sections(self.skeleton)
-
-    @cached_property
-    def _tree(self) -> cKDTree:
-        return cKDTree(self.cloud.points)
+        self.skeleton, self.cloud, self._sections = skeleton, VertexPoints(skeleton), measure_sections(skeleton)
+        self._width, self._tree = half_widths(self.cloud, self._sections), cKDTree(self.cloud.points)
 
     @cached_property
     def bodies(self) -> Ints:

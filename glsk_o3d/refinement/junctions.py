@@ -46,11 +46,6 @@ def move_junctions(skeleton: Skeleton) -> Skeleton:
     the junction. If two of them, or both ends of one, meet more than half the body's half width from the mean of its
     points, that is the junction's place. In a body without a junction, the vertex nearest to its middle takes that
     part. Points there belong to the vertex to which they are nearest, less its radius.
-
-    Returns
-    -------
-    Skeleton
-        With other places of the junctions and of the vertices beside them, perhaps fewer.
     """
     if not len(skeleton.junctions) and not skeleton.n_loops:
         return skeleton
@@ -62,8 +57,8 @@ def move_junctions(skeleton: Skeleton) -> Skeleton:
         if merged is None:
             break
         skeleton = merged
-    handles = Handles(skeleton)
-    if handles.some:
+    if skeleton.n_loops and len(skeleton.supporting_points):
+        handles = Handles(skeleton)
         limbs = Limbs(skeleton, handles.bodies)
         places = _places(skeleton, limbs, known, handles)
     return _straightened(skeleton, limbs, places)
@@ -102,16 +97,13 @@ def _places(
             near = np.linalg.norm(place - body.middle) < body.half_width / 2
             place = place if len(lines) > 2 and near else body.middle
         place = np.clip(place, low, high)  # normals that mean nothing may meet anywhere
-        known[name] = found[junction] = _Place(place, touching, [_entering(line, place) for line in lines])
+        for k, line in enumerate(lines):
+            if len(line.lead) > 1:  # a handle goes straight on through its body to the place nearest to the middle
+                wall = line.lead[:1]
+                way_in = wall + max((place - wall[0]) @ line.way, 0) * line.way
+                lines[k] = line._replace(lead=np.concatenate([way_in, line.lead]))
+        known[name] = found[junction] = _Place(place, touching, lines)
     return found
-
-
-def _entering(line: Line, place: np.ndarray) -> Line:
-    """A line with the way of a handle through its body: straight on to the place nearest to the middle."""
-    if len(line.lead) == 1:
-        return line
-    wall = line.lead[:1]
-    return line._replace(lead=np.concatenate([wall + max((place - wall[0]) @ line.way, 0) * line.way, line.lead]))
 
 
 def _merged(skeleton: Skeleton, limbs: Limbs, places: dict[int, _Place]) -> Skeleton | None:

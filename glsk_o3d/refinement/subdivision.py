@@ -35,8 +35,7 @@ def subdivide_edges(skeleton: Skeleton, spacing: float) -> Skeleton:
     k = np.arange(len(chain)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
     start = np.where(k == 0, ends[chain, 0], first[chain] + k - 1)
     stop = np.where(k == inner[chain], ends[chain, 1], first[chain] + k)
-    edges = np.sort(np.column_stack([start, stop]), axis=1)
-    edges = edges[np.lexsort((edges[:, 1], edges[:, 0]))]
+    edges = np.column_stack([start, stop])
 
     around, vertex_of_point = incident_edges(ends, m), skeleton.vertex_of_point.copy()
     owned = np.flatnonzero(vertex_of_point >= 0)

@@ -4,22 +4,28 @@ import base64
 import hashlib
 import json
 import os
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from datetime import datetime, timezone
 from importlib.resources import files
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
 
 from ..analysis.segmentation import branch_of_edge, branch_of_point, branch_of_vertex
+from ..analysis.summary import ITERATION_COLUMNS, iteration_rows
+from ..decisions import coordinates
 from ..interop.atomic import check_ending, write_atomically
 from ..interop.packages import require
 from ..io.colors import shades
-from ..report import Markup, markup
+from ..report import Markup, Report, markup
 from ..skeleton import Skeleton
-from . import html as sections
 from .figures import MOST_DRAWN_POINTS, thinned
+from .preview import counts
 
 FLAT_SIDE = 0.85  # a box whose least side is less than this share of the next is flat
+MOST_LISTED_ROWS = 12  # of a table
 
 
 def save_report(skeleton: Skeleton, path: str | os.PathLike[str], *, title: str = "Curve skeleton") -> None:
@@ -62,15 +68,15 @@ def _page(skeleton: Skeleton, title: str) -> str:
     report, kind = skeleton.report, "Curve skeleton" if len(skeleton.vertices) else "Point cloud"
     now = datetime.now(timezone.utc).strftime("%d %B %Y, %H:%M UTC")
     thinning = f"The view shows {len(shown):,} of {finite:,} points, drawn at random."
-    below = [sections.contraction(report), sections.topology(report), sections.support(report), sections.origin(report)]
+    below = [contraction(report), topology(report), support(report), origin(report)]
     return markup(
         html,
         title=title,
         subtitle=f"{kind} · glsk-o3d {report.versions.get('glsk-o3d', '')} · {now}",
         digest=digest,  # of the one script that may run
         style=Markup(css),
-        figures=sections.figures(skeleton),
-        warnings=sections.warnings(report.warnings),
+        figures=figures(skeleton),
+        warnings=warnings(report.warnings),
         thinning=thinning if len(shown) < finite else "",
         sections=below,
         # no "<" in it, so that nothing in it can end the script element
@@ -119,3 +125,76 @@ def _data(skeleton: Skeleton, shown: np.ndarray) -> dict[str, Any]:
 def _packed(array: np.ndarray, dtype: str) -> str:
     with np.errstate(over="ignore"):  # radii may be infinitely larger than the cloud
         return base64.b64encode(np.ascontiguousarray(array, dtype).tobytes()).decode()
+
+
+# ------------------------------------------------------------ the parts, all by `markup`, which escapes every text
+
+
+def figures(skeleton: Skeleton) -> Markup:
+    """The counts of the skeleton."""
+    row = "<div><dt>{}</dt><dd>{}</dd></div>"
+    return markup("{}", [markup(row, name.capitalize(), value) for name, value in counts(skeleton).items()])
+
+
+def warnings(messages: Iterable[str]) -> Markup:
+    """The warnings, each once."""
+    rows = [markup("<li>{}</li>", text) for text in dict.fromkeys(messages)]
+    return markup('<div class="warnings" role="note"><strong>Warnings</strong><ul>{}</ul></div>' if rows else "", rows)
+
+
+def contraction(report: Report) -> Markup:
+    """Why the contraction stopped, and how it went, solve by solve."""
+    records = report.iterations
+    if not report.stages and not records:
+        return Markup()
+    end = f"{'Converged' if report.converged else 'Not converged'}: {report.stop_reason}."
+    return markup("<h2>Contraction</h2><p>{}</p>{}", end, _table(ITERATION_COLUMNS, iteration_rows(records)))
+
+
+def topology(report: Report) -> Markup:
+    """What was closed, cut and bridged, and what was kept or left by a narrow margin: the least certain first."""
+    if not report.decisions:
+        return Markup()
+    counts = Counter(it.outcome for it in report.decisions)
+    done = ", ".join(f"{outcome}: {n:,}" for outcome, n in sorted(counts.items()))
+    calls = f"{done}; {len(report.uncertain):,} of {len(report.decisions):,} close calls."
+    listed = [it for it in report.decisions if it.changed or it.is_uncertain]
+    listed.sort(key=lambda it: abs(it.probability - 0.5))
+    rows = [(it.outcome, it.question, f"{it.probability:.2f}") for it in listed[:MOST_LISTED_ROWS]]
+    marks = [Markup(' class="uncertain"' if it.is_uncertain else "") for it in listed[:MOST_LISTED_ROWS]]
+    rest = len(listed) - MOST_LISTED_ROWS
+    more = markup('<p class="muted small">and {} clearer ones</p>' if rest > 0 else "", f"{rest:,}")
+    table = _table(("done", "question", "probability"), rows, "topology", marks)
+    return markup("<h2>Topology</h2><p>{}</p>{}{}", calls, table, more)
+
+
+def support(report: Report) -> Markup:
+    """How many samples have the same graph, and what many of them do not show: the most doubtful first."""
+    if not report.n_draws:
+        return Markup()
+    rows = [
+        (f"{it.about} at ({coordinates(it.place)})", "yes" if it.present else "no", f"{it.share:.0%}")
+        for it in report.unsupported[:MOST_LISTED_ROWS]
+    ]
+    share = f"{report.n_agreeing:,} of {report.n_draws:,} samples of the cloud have the same graph."
+    return markup("<h2>Support</h2><p>{}</p>{}", share, _table(("part", "here", "samples"), rows, "support"))
+
+
+def origin(report: Report) -> Markup:
+    """The run in a table, and what it takes to repeat it: the recipe, or else the stages."""
+    text = json.dumps(report.recipe, indent=2, ensure_ascii=False) if report.recipe else "\n".join(report.stages)
+    recipe = markup("<details><summary>Recipe</summary><pre>{}</pre></details>" if text else "", text)
+    return markup('<h2>The run</h2><div class="run">{}</div>{}', report._repr_html_(), recipe)
+
+
+def _table(heads: Iterable[str], rows: Sequence[Sequence[str]], kind: str = "", marks: Sequence[str] = ()) -> Markup:
+    """A table of texts, nothing without rows; `marks` are attributes of the rows."""
+    if not rows:
+        return Markup()
+    head = [markup("<th>{}</th>", each) for each in heads]
+    body = [
+        markup("<tr{}>{}</tr>", mark, [markup("<td>{}</td>", cell) for cell in row])
+        for mark, row in zip_longest(marks, rows, fillvalue="")
+    ]
+    table = '<div class="wide {}"><table><thead><tr>{}</tr></thead><tbody>{}</tbody></table></div>'
+    return markup(table, kind, head, body)

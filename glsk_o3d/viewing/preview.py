@@ -2,7 +2,6 @@
 
 import os
 import textwrap
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -75,7 +74,9 @@ def draw(skeleton: Skeleton, title: str | None = None) -> Any:
     width, height = figure.get_size_inches()
     told = (f"{name}_{value}" for name, value in counts(skeleton).items())
     counted = [line.replace("_", " ") for line in _wrapped("   ".join(told), width)]
-    warned = _warned(report.warnings, width)
+    warned = [line for text in report.warnings[:_MOST_WARNINGS] for line in _wrapped(f"warning: {text}", width)]
+    if (more := len(report.warnings) - _MOST_WARNINGS) > 0:
+        warned.append(f"and {more} more warning{'s' * (more > 1)}")
     heads = _wrapped(figures.printable(title or ""), width / _TITLE_SIZE)
     below, head = _LINE_HEIGHT * len(warned), head + _TITLE_SIZE * _LINE_HEIGHT * max(len(heads) - 1, 0)
     foot += _LINE_HEIGHT * (len(counted) - 1)
@@ -144,10 +145,3 @@ def _wrapped(text: str, width: float) -> list[str]:
     """A text in at most two lines of small letters as wide as a picture."""
     letters = int((width - 2 * figures.VIEW_GAP) / _LETTER_WIDTH)
     return textwrap.wrap(text, letters, max_lines=_MOST_LINES, placeholder=" ...", break_on_hyphens=False)
-
-
-def _warned(warnings: Sequence[str], width: float) -> list[str]:
-    """The first two warnings in two lines each, and how many more there are."""
-    lines = [line for warning in warnings[:_MOST_WARNINGS] for line in _wrapped(f"warning: {warning}", width)]
-    more = len(warnings) - _MOST_WARNINGS
-    return [*lines, *[f"and {more} more warning{'s' * (more > 1)}"] * (more > 0)]

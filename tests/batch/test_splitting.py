@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from collections import Counter
 from dataclasses import asdict
 
 import numpy as np
@@ -11,7 +12,8 @@ from glsk_o3d import FileFormatError, InvalidCloudError
 from glsk_o3d.batch import splitting
 from glsk_o3d.batch.grid import tile_of
 from glsk_o3d.batch.ledger import file_hash
-from glsk_o3d.batch.splitting import Cut, PartFiles, divide, known_split
+from glsk_o3d.batch.splitting import Cut, add_to_parts, divide, known_split
+from glsk_o3d.io import streaming
 from glsk_o3d.io.scan import Scan
 from glsk_o3d.io.scans import read_blocks, read_scan
 
@@ -40,11 +42,12 @@ def passes(monkeypatch):
     """How often a file has been read; in small blocks."""
     count = []
 
-    def read(path, where=None):
+    def read(path, **options):
         count.append(path)
-        return read_blocks(path, rows=70, where=where)
+        return read_blocks(path, rows=70, **options)
 
-    monkeypatch.setattr(splitting, "read_blocks", read)
+    for module in (splitting, streaming):
+        monkeypatch.setattr(module, "read_blocks", read)
     return count
 
 
@@ -107,7 +110,7 @@ def test_what_breaks_off_or_cannot_be_read_leaves_nothing(scene, split, tmp_path
 def test_a_splitting_that_is_killed_is_begun_anew(scene, split, tmp_path):
     code = (
         "import os, sys; from pathlib import Path; from glsk_o3d.batch import splitting as s\n"
-        "s.PartFiles.close = lambda self: os._exit(9)\n"
+        "s.write_json = lambda path, data: os._exit(9)\n"
         "s.divide(Path(sys.argv[1]), Path(sys.argv[2]), s.Cut(2.0, 0.25), [])"
     )
     run = subprocess.run([sys.executable, "-c", code, str(scene), str(tmp_path / "parts")])
@@ -119,10 +122,9 @@ def test_a_splitting_that_is_killed_is_begun_anew(scene, split, tmp_path):
 def test_normals_and_colours_stay(tmp_path):
     rng = np.random.default_rng(1)
     scan = Scan(rng.random((10, 3)), colors=rng.integers(0, 256, (10, 3)) / 255, normals=rng.normal(size=(10, 3)))
-    files = PartFiles(tmp_path)
-    files.add(scan, {"a": np.arange(6)})
-    files.add(scan, {"a": np.arange(6, 10), "b": np.arange(3)})
-    files.close()
+    counts = Counter()
+    add_to_parts(tmp_path, scan, {"a": np.arange(6)}, counts)
+    add_to_parts(tmp_path, scan, {"a": np.arange(6, 10), "b": np.arange(3)}, counts)
     again = read_scan(tmp_path / "a.ply")
     np.testing.assert_array_equal(again.positions, scan.positions)
     np.testing.assert_allclose(again.colors, scan.colors, atol=1e-7)

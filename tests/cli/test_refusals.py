@@ -75,8 +75,8 @@ BEFORE_ANY_RUN = """
     2 run glskeletn SCANS/ring.ply -o s.ply                | no filter script is called 'glskeletn': did you mean
     1 run none.mlx SCANS/ring.ply -o s.ply                 | none.mlx: no such file
     1 run bad.mlx SCANS/ring.ply -o s.ply                  | bad.mlx, line 2: no filter is called 'Generate Skeletn'
-    2 run glskeleton SCANS/ring.ply -o s.stl               | s.stl: unknown ending; known are .ply
-    2 run points.mlx SCANS/ring.ply -o s.json              | s.json: unknown ending for points or mesh; known are .ply
+    2 run glskeleton SCANS/ring.ply -o s.stl               | s.stl: the last layer is a skeleton and its name
+    2 run points.mlx SCANS/ring.ply -o s.json              | points or a mesh and its name ends in .ply
     1 run glskeleton y.ply -o t.json                       | y.ply: is a skeleton, not a scan
     1 batch none -o out                                    | none: no such file or folder
     2 batch SCANS/ring.ply -o out --format stl             | unknown ending; known are .ply

@@ -8,8 +8,7 @@ import pytest
 from scipy.spatial import ConvexHull, cKDTree
 
 from glsk_o3d import Contractor, RingBuilder, Sampler, pipelines
-from glsk_o3d.crosscheck.mesh import ball_pivoting, mesh_laplacian, mesh_skeleton, mesh_state, orient_normals
-from glsk_o3d.crosscheck.mesh_rings import umbrellas
+from glsk_o3d.crosscheck.mesh import ball_pivoting, mesh_laplacian, mesh_skeleton, mesh_state, orient_normals, umbrellas
 from glsk_o3d.numerics.cotangent import WEIGHT_CAP, cotangent_laplacian
 from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
 from glsk_o3d.numerics.rings import Rings

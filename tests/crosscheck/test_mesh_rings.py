@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from glsk_o3d.crosscheck.mesh_rings import clean_faces, umbrellas
+from glsk_o3d.crosscheck.mesh import clean_faces, umbrellas
 
 OCTAHEDRON = np.array([[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]])
 

@@ -17,7 +17,7 @@ from glsk_o3d.decisions import Decision, Supported
 from glsk_o3d.io.formats import fields
 from glsk_o3d.report import IterationRecord, Report
 from glsk_o3d.samples import torus
-from glsk_o3d.viewing import html as sections
+from glsk_o3d.viewing import page as sections
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from ...analysis.branches import branch_table
 from ...analysis.curves import simple_edges
-from ...editing.edits import cut_loops, reroot
+from ...editing import cut_loops, reroot
 from ...errors import FileFormatError
 from ...refinement.rooted import RootPlace, numbered_from
 from ...skeleton import Skeleton

@@ -28,7 +28,7 @@ from .graphs import NoEdges, graph_skeleton
 SECTION = ("half_width", "half_thickness")
 LONGEST_LINE = 1 << 16  # derived: far beyond any line of a header, so that an endless file without lines ends
 LONGEST_HEADER = 1 << 12  # derived: in lines, likewise
-COUNT_WIDTH = 20  # derived: digits of the largest 64-bit number: a header may be written before the count is known
+COUNT_WIDTH = 20  # derived: digits of the largest 64-bit number: another count fits in its place
 MORE_THAN_PROMISED = "it holds more than its header promises"
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _KINDS = {
@@ -316,20 +316,14 @@ def triangles(faces: Table, n: int) -> np.ndarray:
 # ------------------------------------------------------------------------------------------------------------- writing
 
 
-def content(columns: Mapping[str, np.ndarray], triangles: np.ndarray | None = None) -> bytes:
-    """A file of vertices, columns by name, and of triangles, (T, 3) int array."""
-    vertices = rows_of(columns)
-    if triangles is None:
-        return header_of(vertices.dtype, len(vertices)) + vertices.tobytes()
-    faces = np.empty(len(triangles), [("n", "u1"), ("corners", "<i4", 3)])
-    faces["n"], faces["corners"] = 3, triangles
-    more = f"element face {len(faces)}\nproperty list uchar int vertex_indices\n"
-    return header_of(vertices.dtype, len(vertices), more=more) + vertices.tobytes() + faces.tobytes()
-
-
 def save(path: Path, held: Mapping[str, ArrayLike], triangles: ArrayLike | None = None) -> None:
-    """Write points with what `columns_of` takes, and triangles between them, as `write_atomically` does."""
-    data = content(columns_of(held), triangles if triangles is None else np.asarray(triangles))
+    """Write points with what `columns_of` takes, and triangles (T, 3) between them, as `write_atomically` does."""
+    vertices, corners, more = rows_of(columns_of(held)), np.asarray(() if triangles is None else triangles), ""
+    faces = np.empty(len(corners), [("n", "u1"), ("corners", "<i4", 3)])
+    if triangles is not None:
+        faces["n"], faces["corners"] = 3, corners
+        more = f"element face {len(faces)}\nproperty list uchar int vertex_indices\n"
+    data = header_of(vertices.dtype, len(vertices), more=more) + vertices.tobytes() + faces.tobytes()
     write_atomically(path, lambda temporary: temporary.write_bytes(data))
 
 
@@ -353,6 +347,16 @@ def rows_of(columns: Mapping[str, np.ndarray]) -> np.ndarray:
     for name, values in columns.items():
         rows[name] = values
     return rows
+
+
+def append(path: Path, rows: np.ndarray, n: int) -> int:
+    """Add rows to the n that a file has, which is made for the first; gives how many it has, as its header says."""
+    n += len(rows)
+    with path.open("r+b" if n > len(rows) else "wb") as stream:
+        stream.write(header_of(rows.dtype, n, width=COUNT_WIDTH))
+        stream.seek(0, os.SEEK_END)
+        stream.write(rows.tobytes())
+    return n
 
 
 def header_of(row: np.dtype, n: int, *, width: int = 0, comment: str = "", more: str = "") -> bytes:

@@ -1,4 +1,4 @@
-"""One component, no loops, another root, fewer branches, fewer vertices."""
+"""Functions that prune, simplify and reroot a skeleton. Each returns a new one."""
 
 from collections import Counter
 from dataclasses import replace
@@ -6,15 +6,17 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse.csgraph import minimum_spanning_tree
 
-from ..analysis.branches import branch_table
-from ..errors import InvalidParameterError
-from ..numerics.near_links import linked
-from ..numerics.polylines import arc_lengths
-from ..numerics.vectors import TINY, norm
-from ..parameters import check_number
-from ..refinement.merging import merge_into, some_vertices
-from ..refinement.rooted import RootPlace, numbered_from, root_among
-from ..skeleton import Skeleton
+from .analysis.branches import branch_table
+from .errors import InvalidParameterError
+from .numerics.near_links import linked
+from .numerics.polylines import arc_lengths
+from .numerics.vectors import TINY, norm
+from .parameters import check_number
+from .refinement.merging import merge_into, some_vertices
+from .refinement.rooted import RootPlace, numbered_from, root_among
+from .skeleton import Skeleton
+
+__all__ = ["cut_loops", "largest_component", "prune", "reroot", "simplify"]
 
 
 def largest_component(skeleton: Skeleton) -> Skeleton:
