@@ -156,12 +156,14 @@ class _View:
         self._places, self._evidence, self._axes = (self.places - self.centre) @ axes[:2].T, evidence, axes
         extent = np.linalg.norm(loop - self.centre, axis=1).max() + tube
         self._half = self.radius + tube  # of what stands in the way, along the normal
-        self._see(2 * extent)
-        if (self.sight > self._clear).any():
-            self._see(np.inf)
+        self._reaches = iter((extent, 2 * extent, np.inf))
+        self._see()
+        while (self.sight > self._clear).any():
+            self._see()
 
-    def _see(self, reach: float) -> None:
-        """Take up the points so near to the centre in the plane: from each place all in a circle, which is `_clear`."""
+    def _see(self) -> None:
+        """Take up points farther from the centre in the plane: from each place all in a circle, which is `_clear`."""
+        reach = next(self._reaches)
         rows = self._evidence.near(self.centre, float(np.hypot(reach, self._half)))
         points = (self._evidence.points[rows] - self.centre) @ self._axes.T
         near = np.abs(points[:, 2]) < self._half
@@ -180,7 +182,7 @@ class _View:
         nearest = order[np.unique(sector[order], return_index=True)[1]]
         clear = self._clear[place]
         if clear < np.inf and (len(nearest) < WALL_SECTORS or distance[nearest].max() >= clear):
-            self._see(np.inf)
+            self._see()
             return self.walls(place)
         cosine = np.abs((self._normals[nearest] * way[nearest]).sum(axis=1)) / np.maximum(distance[nearest], TINY)
         return float(cosine.sum() / WALL_SECTORS)
@@ -214,6 +216,10 @@ def crossings(place: np.ndarray, n: int, bonds: tuple[np.ndarray, np.ndarray], c
     closed, edges lead from each position to the next, and bonds the shorter way; else the last one is none.
     """
     pairs, weight = bonds
+    some = np.flatnonzero(place >= 0)
+    start, stop = np.searchsorted(pairs[:, 0], [some, some + 1])  # bonds are in the order of their first vertices
+    rows = np.arange((stop - start).sum()) + np.repeat(stop - np.cumsum(stop - start), stop - start)
+    pairs, weight = pairs[rows], weight[rows]
     first, last = np.sort(place[pairs], axis=1).T
     inside = first >= 0
     first, last, weight = first[inside], last[inside], weight[inside]
