@@ -19,6 +19,7 @@ from ..numerics.vectors import TINY, dot, finite_rows
 from ..numerics.winding import AREA_NEIGHBOURS, orient_from_axis, point_areas, winding_number
 from ..skeleton import Skeleton
 from .merging import with_fields
+from .sections import VertexPoints
 
 # fitted: winding number below which an axis is in little; .5 on that of a tube seen from one side, .2 in sparse crowns
 LEAST_INSIDE = 0.4
@@ -152,6 +153,10 @@ class Evidence(SurfaceGraph):
         between them, cos^2 times sin^2 times sin^2: not where surfaces of two parts face each other.
         """
         return self._once("bonds", skeleton, lambda: self._bonds(skeleton))
+
+    def distances(self, skeleton: Skeleton) -> np.ndarray:
+        """Median distance from every vertex to its points, (M,) float array."""
+        return self._once("distances", skeleton, lambda: VertexPoints(skeleton).distance)
 
     def _once(self, what: str, skeleton: Skeleton, ask: Callable[[], Any]) -> Any:
         """What was said of the same skeleton before, or is now."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Callable
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +19,6 @@ from ..skeleton import Skeleton
 from .diagnostics import MAJORITY
 from .evidence import LEAST_INSIDE, Evidence, ask_once
 from .merging import collapse_triangles, drop_edges, merge_vertices
-from .sections import VertexPoints
 from .thin_parts import SURFACE_GROWTH, UNSURE_CONFIDENCE, SpacedPoints
 
 WIDE_LOOP = 1.4  # fitted: surface distances, the radius of a loop that is more than two strands in one part
@@ -33,36 +33,48 @@ WALL_SECTORS = 16  # precision: directions around a place in which walls are loo
 def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Decision]]:
     """Close the loops that are handles with a probability of less than `least`, until there are none.
 
-    Narrow ones, two strands in one part, are collapsed; wide ones are cut where the fewest bonds cross. There is one
-    decision for each loop of the minimum cycle bases, closed or left.
+    Narrow ones, two strands in one part, are collapsed; wide ones are cut where the fewest bonds cross. Those that
+    share a vertex with one that is cut are asked about later, if they are still there. There is one decision for each
+    loop that was closed, and for each of the minimum cycle basis that is left.
     """
     decisions: list[Decision] = []
     known, wires = dict[bytes, LoopEvidence](), None
+    circle = cache(_circle)
     while True:
         cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
-        names = [skeleton.vertices[cycle].tobytes() for cycle in cycles]
-        loops = ask_once(known, names, cycles, partial(loop_facts, skeleton, evidence=evidence))
-        kept, narrow, cut, used = list[Decision](), [], [], set[int]()
-        wires = _is_frame_of_wires(skeleton, cycles, loops) if wires is None else wires
-        for cycle, loop in zip(cycles, loops, strict=True):
-            if wires and (skeleton.confidence[cycle] < UNSURE_CONFIDENCE).mean() > MAJORITY:
-                loop = loop.without_normals()
-            false = loop.probability < least
-            where = tuple(loop.centre.tolist())
-            (decisions if false else kept).append(Decision("loop", where, loop.probability, false))
-            if not false:
-                continue
-            if loop.is_narrow:
-                narrow.append(cycle)
-            elif used.isdisjoint(cycle.tolist()):  # two cuts in what two loops share would tear a piece out of it
-                cut.append(sorted((cycle[loop.weakest], cycle[(loop.weakest + 1) % len(cycle)])))
-                used.update(cycle.tolist())
-        if not narrow and not cut:
-            return skeleton, decisions + kept
+        names, members = [skeleton.vertices[cycle].tobytes() for cycle in cycles], [set(c.tolist()) for c in cycles]
+        tubes = _tubes(skeleton, cycles, evidence)
+        narrow = [circle(name)[1] < WIDE_LOOP * tube for name, tube in zip(names, tubes, strict=True)]
+        wires = _is_frame_of_wires(skeleton, cycles, narrow) if wires is None else wires
+        loops, cut, used, left = dict[int, LoopEvidence](), [], set[int](), [*range(len(cycles))]
+        while left:  # each waits for those before it; two cuts in what two loops share would tear a piece out of it
+            asked, waiting, before = list[int](), [], set[int]()
+            for i in left:
+                if narrow[i] or before.isdisjoint(members[i]):
+                    asked.append(i)
+                else:
+                    waiting.append(i)
+                before.update(() if narrow[i] else members[i])
+            ask = partial(loop_facts, skeleton, evidence=evidence, circle=circle)
+            answers = ask_once(known, [names[i] for i in asked], [cycles[i] for i in asked], ask)
+            for i, loop in zip(asked, answers, strict=True):
+                if wires and (skeleton.confidence[cycles[i]] < UNSURE_CONFIDENCE).mean() > MAJORITY:
+                    loop = loop.without_normals()
+                loops[i] = loop
+                if loop.probability < least and not narrow[i]:
+                    cut.append(np.sort(cycles[i][[loop.weakest, (loop.weakest + 1) % len(cycles[i])]]))
+                    used |= members[i]
+            left = [i for i in waiting if used.isdisjoint(members[i])]
+        rows = [(i, loop, loop.probability < least) for i, loop in sorted(loops.items())]
+        found = [Decision("loop", tuple(loop.centre.tolist()), loop.probability, false) for _, loop, false in rows]
+        decisions += [each for each in found if each.changed]
+        closed = [cycles[i] for i, _, false in rows if false and narrow[i]]
+        if not closed and not cut:
+            return skeleton, decisions + found
         if cut:
             skeleton = drop_edges(skeleton, cut)
-        if narrow:
-            pairs = np.concatenate([facing_pairs(skeleton.vertices[cycle], cycle) for cycle in narrow])
+        if closed:
+            pairs = np.concatenate([facing_pairs(skeleton.vertices[cycle], cycle) for cycle in closed])
             labels = component_labels(len(skeleton.vertices), pairs)
             skeleton = collapse_triangles(merge_vertices(skeleton, labels))
 
@@ -72,7 +84,6 @@ class LoopEvidence(NamedTuple):
 
     facts: dict[str, float]
     inside: float  # median winding number along it
-    is_narrow: bool  # two strands in one part
     centre: np.ndarray  # of its hole
     weakest: int  # position of the edge, from there to the next vertex, that the fewest bonds cross
 
@@ -86,18 +97,34 @@ class LoopEvidence(NamedTuple):
         return self._replace(facts=self.facts | dict(bonds=float(np.log(1 + 0.1))), inside=LEAST_INSIDE)
 
 
-def _is_frame_of_wires(skeleton: Skeleton, cycles: list[np.ndarray], loops: list[LoopEvidence]) -> bool:
+def _is_frame_of_wires(skeleton: Skeleton, cycles: list[np.ndarray], narrow: list[bool]) -> bool:
     """Whether most has no surface and is on wide loops, as in no crown, and does not fill space, as noise does."""
     thin, wide = skeleton.confidence < UNSURE_CONFIDENCE, np.zeros(len(skeleton.vertices), bool)
-    for cycle, loop in zip(cycles, loops, strict=True):
-        wide[cycle] |= not loop.is_narrow
+    for cycle, is_narrow in zip(cycles, narrow, strict=True):
+        wide[cycle] |= not is_narrow
     if thin.mean() <= MAJORITY or thin[wide].sum() <= WIRES_ON_LOOPS * thin.sum():
         return False
     cloud = SpacedPoints(skeleton)
     return bool(np.median(link_growth(cloud.links)[thin[cloud.vertex]]) < SURFACE_GROWTH)
 
 
-def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> list[LoopEvidence]:
+def _circle(loop: bytes) -> tuple[np.ndarray, float]:
+    """The `inscribed_circle` of a loop, given by the coordinates of its vertices."""
+    return inscribed_circle(np.frombuffer(loop).reshape(-1, 3))
+
+
+def _tubes(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> list[float]:
+    """Median distance of the surface along each of some loops."""
+    surface = evidence.distances(skeleton)
+    return [max(quantile(surface[cycle]), TINY) for cycle in cycles]
+
+
+def loop_facts(
+    skeleton: Skeleton,
+    cycles: list[np.ndarray],
+    evidence: Evidence,
+    circle: Callable[[bytes], tuple[np.ndarray, float]] = _circle,
+) -> list[LoopEvidence]:
     """What speaks for and against that each of some loops is a handle.
 
     The facts are logarithms: of the radius of the largest circle inside it, in spacings of the points, at most six; of
@@ -111,18 +138,16 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
     """
     if not cycles:
         return []
-    surface = VertexPoints(skeleton).distance
-    tubes = [max(quantile(surface[cycle]), TINY) for cycle in cycles]
     bonds, spacing = evidence.bonds(skeleton), max(evidence.spacing, TINY)
-    loops = [skeleton.vertices[cycle] for cycle in cycles]
-    views = [_View(loop, tube, evidence) for loop, tube in zip(loops, tubes, strict=True)]
+    loops, tubes = [skeleton.vertices[cycle] for cycle in cycles], _tubes(skeleton, cycles, evidence)
+    views = [_View(loop, tube, evidence, *circle(loop.tobytes())) for loop, tube in zip(loops, tubes, strict=True)]
     vertices, which = np.unique(np.concatenate(cycles), return_inverse=True)  # loops of a lattice share most of theirs
     along = evidence.winding_at(skeleton.vertices[vertices])[which]
     medians = [quantile(each) for each in np.split(along, np.cumsum([len(loop) for loop in loops[:-1]]))]
     falls = _falls(views, np.array(medians), evidence)
     found = []
-    for cycle, tube, view, inside, fall in zip(cycles, tubes, views, medians, falls, strict=True):
-        crossing = crossings(positions(cycle, len(surface)), len(cycle), bonds, closed=True)
+    for cycle, view, inside, fall in zip(cycles, views, medians, falls, strict=True):
+        crossing = crossings(positions(cycle, len(skeleton.vertices)), len(cycle), bonds, closed=True)
         best = int(np.argmax(view.sight * fall))
         passage = min(view.sight[best] / spacing, CLEAR_SIGHT) * min(fall[best], view.walls(best))
         facts = dict(
@@ -130,8 +155,7 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
             passage=float(np.log(passage + 0.3)),
             bonds=float(np.log(crossing.min() / max(quantile(crossing), TINY) + 0.1)),
         )
-        narrow = view.radius < WIDE_LOOP * tube
-        found.append(LoopEvidence(facts, inside, narrow, view.centre, int(np.argmin(crossing))))
+        found.append(LoopEvidence(facts, inside, view.centre, int(np.argmin(crossing))))
     return found
 
 
@@ -148,8 +172,8 @@ class _View:
         Radius of the widest cylinder without points that stands on each.
     """
 
-    def __init__(self, loop: np.ndarray, tube: float, evidence: Evidence) -> None:
-        self.centre, self.radius = inscribed_circle(loop)
+    def __init__(self, loop: np.ndarray, tube: float, evidence: Evidence, centre: np.ndarray, radius: float) -> None:
+        self.centre, self.radius = centre, radius
         self.places, axes = places_inside(loop, LOOP_GRID)
         if not len(self.places):
             self.places = self.centre[None]
