@@ -80,33 +80,34 @@ def _horton(chains: list[Chain]) -> list[Chain]:
         shortest[a, b] = shortest[b, a] = e
     m, keys = len(junctions), np.array(list(shortest))
     graph = csr_matrix((lengths[list(shortest.values())], keys.T), shape=(m, m))
-    rank, reach = len(chains) - m + component_labels(m, ends).max() + 1, lengths.max()
-    basis = list[tuple[float, list[int]]]()
-    while len(basis) < rank:  # in a large graph all cycles of a basis are short
-        reach *= 2
-        basis, pivots = [], dict[int, int]()
-        for total, e, before, top in _closed(graph, reach, ends, lengths, shortest):
-            on = [e]
+    rank, high = len(chains) - m + component_labels(m, ends).max() + 1, 0.0
+    basis, pivots = list[tuple[float, list[int]]](), dict[int, int]()
+    while len(basis) < rank:  # in a large graph most cycles of a basis are short
+        low, high = high, max(2 * high, 4 * lengths.max())
+        for total, e, before, top in _closed(graph, low, high, ends, lengths, shortest):
+            cycle = 1 << e
             for v in ends[e].tolist():
                 while v != top:
                     u = int(before[v])
-                    on.append(shortest[u, v])
+                    cycle |= 1 << shortest[u, v]
                     v = u
-            reduced = sum(1 << i for i in on)
+            reduced = cycle
             while reduced and (pivot := reduced.bit_length()) in pivots:
                 reduced ^= pivots[pivot]
             if reduced:
                 pivots[reduced.bit_length()] = reduced
-                basis.append((total, _walk([chains[i][1] for i in sorted(on)])))
+                bits = np.frombuffer(cycle.to_bytes(len(chains) // 8 + 1, "little"), np.uint8)
+                on = np.flatnonzero(np.unpackbits(bits, bitorder="little"))
+                basis.append((total, _walk([chains[i][1] for i in on.tolist()])))
             if len(basis) == rank:
                 break
     return basis
 
 
 def _closed(
-    graph: csr_matrix, reach: float, ends: Ints, lengths: Floats, shortest: Chains
+    graph: csr_matrix, low: float, high: float, ends: Ints, lengths: Floats, shortest: Chains
 ) -> Iterator[tuple[float, int, Ints, int]]:
-    """Simple cycles of a chain and the shortest paths from a root to its two ends, up to twice a length `reach`.
+    """Simple cycles of a chain and the shortest paths from a root to its two ends, longer than `low`, up to `high`.
 
     The shortest first, and each once: of those that are closed from several roots the first. It is known by the sum of
     random codes of its chains, and is simple if its paths start apart. With its length and chain come the vertices
@@ -119,14 +120,14 @@ def _closed(
     for start in range(0, m, max(ROOTS_CHUNK // len(lengths), 1)):
         root = np.arange(m)[start : start + max(ROOTS_CHUNK // len(lengths), 1), None]
         # what rounding adds to half of a cycle must not put it out of reach
-        distance, before = dijkstra(graph, indices=root[:, 0], return_predecessors=True, limit=(1 + 1e-9) * reach)
+        distance, before = dijkstra(graph, indices=root[:, 0], return_predecessors=True, limit=(0.5 + 1e-9) * high)
         up, each = np.where(before < 0, root, before), np.arange(m)
         first, name = np.where(up == root, each, up), code[up, each]
         apart, totals = alone | ((up[:, b] != a) & (up[:, a] != b)), distance[:, a] + distance[:, b] + lengths
         while (up != root).any():  # twice as far up at a time
             name ^= np.take_along_axis(name, up, axis=1)
             up, first = (np.take_along_axis(table, table, axis=1) for table in (up, first))
-        row, e = np.nonzero(apart & (first[:, a] != first[:, b]) & (totals <= 2 * reach))
+        row, e = np.nonzero(apart & (first[:, a] != first[:, b]) & (low < totals) & (totals <= high))
         above.append(before)
         found.append((totals[row, e], e, row + start, name[row, a[e]] ^ name[row, b[e]] ^ codes[e]))
     total, e, top, name = (np.concatenate(part) for part in zip(*found, strict=True))
