@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache, partial
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..decisions import QUESTIONS, Decision
-from ..numerics.cycles import inscribed_circle, minimum_cycle_basis, places_inside
+from ..numerics.cycles import minimum_cycle_basis, places_inside
 from ..numerics.groups import component_labels, group_rank, quantile
 from ..numerics.near_links import link_growth
 from ..numerics.polylines import arc_lengths
@@ -39,12 +38,11 @@ def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
     """
     decisions: list[Decision] = []
     known, wires = dict[bytes, LoopEvidence](), None
-    circle = cache(_circle)
     while True:
         cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
         names, members = [skeleton.vertices[cycle].tobytes() for cycle in cycles], [set(c.tolist()) for c in cycles]
-        tubes = _tubes(skeleton, cycles, evidence)
-        narrow = [circle(name)[1] < WIDE_LOOP * tube for name, tube in zip(names, tubes, strict=True)]
+        tubes = evidence.tubes(skeleton, cycles)
+        narrow = [evidence.circle(skeleton.vertices[c])[1] < WIDE_LOOP * t for c, t in zip(cycles, tubes, strict=True)]
         wires = _is_frame_of_wires(skeleton, cycles, narrow) if wires is None else wires
         loops, cut, used, left = dict[int, LoopEvidence](), [], set[int](), [*range(len(cycles))]
         while left:  # each waits for those before it; two cuts in what two loops share would tear a piece out of it
@@ -55,7 +53,7 @@ def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
                 else:
                     waiting.append(i)
                 before.update(() if narrow[i] else members[i])
-            ask = partial(loop_facts, skeleton, evidence=evidence, circle=circle)
+            ask = partial(loop_facts, skeleton, evidence=evidence)
             answers = ask_once(known, [names[i] for i in asked], [cycles[i] for i in asked], ask)
             for i, loop in zip(asked, answers, strict=True):
                 if wires and (skeleton.confidence[cycles[i]] < UNSURE_CONFIDENCE).mean() > MAJORITY:
@@ -108,23 +106,7 @@ def _is_frame_of_wires(skeleton: Skeleton, cycles: list[np.ndarray], narrow: lis
     return bool(np.median(link_growth(cloud.links)[thin[cloud.vertex]]) < SURFACE_GROWTH)
 
 
-def _circle(loop: bytes) -> tuple[np.ndarray, float]:
-    """The `inscribed_circle` of a loop, given by the coordinates of its vertices."""
-    return inscribed_circle(np.frombuffer(loop).reshape(-1, 3))
-
-
-def _tubes(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> list[float]:
-    """Median distance of the surface along each of some loops."""
-    surface = evidence.distances(skeleton)
-    return [max(quantile(surface[cycle]), TINY) for cycle in cycles]
-
-
-def loop_facts(
-    skeleton: Skeleton,
-    cycles: list[np.ndarray],
-    evidence: Evidence,
-    circle: Callable[[bytes], tuple[np.ndarray, float]] = _circle,
-) -> list[LoopEvidence]:
+def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> list[LoopEvidence]:
     """What speaks for and against that each of some loops is a handle.
 
     The facts are logarithms: of the radius of the largest circle inside it, in spacings of the points, at most six; of
@@ -139,8 +121,8 @@ def loop_facts(
     if not cycles:
         return []
     bonds, spacing = evidence.bonds(skeleton), max(evidence.spacing, TINY)
-    loops, tubes = [skeleton.vertices[cycle] for cycle in cycles], _tubes(skeleton, cycles, evidence)
-    views = [_View(loop, tube, evidence, *circle(loop.tobytes())) for loop, tube in zip(loops, tubes, strict=True)]
+    loops, tubes = [skeleton.vertices[cycle] for cycle in cycles], evidence.tubes(skeleton, cycles)
+    views = [_View(loop, tube, evidence) for loop, tube in zip(loops, tubes, strict=True)]
     vertices, which = np.unique(np.concatenate(cycles), return_inverse=True)  # loops of a lattice share most of theirs
     along = evidence.winding_at(skeleton.vertices[vertices])[which]
     medians = [quantile(each) for each in np.split(along, np.cumsum([len(loop) for loop in loops[:-1]]))]
@@ -172,8 +154,8 @@ class _View:
         Radius of the widest cylinder without points that stands on each.
     """
 
-    def __init__(self, loop: np.ndarray, tube: float, evidence: Evidence, centre: np.ndarray, radius: float) -> None:
-        self.centre, self.radius = centre, radius
+    def __init__(self, loop: np.ndarray, tube: float, evidence: Evidence) -> None:
+        self.centre, self.radius = evidence.circle(loop)
         self.places, axes = places_inside(loop, LOOP_GRID)
         if not len(self.places):
             self.places = self.centre[None]
