@@ -69,16 +69,14 @@ def _horton(chains: list[Chain]) -> list[Chain]:
     """Minimum cycle basis of the multigraph of chains between different junctions."""
     if not chains:
         return []
-    junctions = sorted({v for _, chain in chains for v in (chain[0], chain[-1])})
-    index = {v: i for i, v in enumerate(junctions)}
-    ends = np.array([(index[chain[0]], index[chain[-1]]) for _, chain in chains])
+    ends = np.unique([(chain[0], chain[-1]) for _, chain in chains], return_inverse=True)[1].reshape(-1, 2)
     lengths = np.array([length for length, _ in chains])
     order = np.argsort(lengths, kind="stable")
     shortest: Chains = {}
     for e in order[::-1].tolist():  # of parallel chains the shortest stays
         a, b = ends[e].tolist()
         shortest[a, b] = shortest[b, a] = e
-    m, keys = len(junctions), np.array(list(shortest))
+    m, keys = int(ends.max()) + 1, np.array(list(shortest))
     graph = csr_matrix((lengths[list(shortest.values())], keys.T), shape=(m, m))
     rank, high = len(chains) - m + component_labels(m, ends).max() + 1, 0.0
     basis, pivots = list[tuple[float, list[int]]](), dict[int, int]()
@@ -96,8 +94,8 @@ def _horton(chains: list[Chain]) -> list[Chain]:
                 reduced ^= pivots[pivot]
             if reduced:
                 pivots[reduced.bit_length()] = reduced
-                bits = np.frombuffer(cycle.to_bytes(len(chains) // 8 + 1, "little"), np.uint8)
-                on = np.flatnonzero(np.unpackbits(bits, bitorder="little"))
+                on = np.frombuffer(cycle.to_bytes(len(chains) // 8 + 1, "little"), np.uint8)
+                on = np.flatnonzero(np.unpackbits(on, bitorder="little"))
                 basis.append((total, _walk([chains[i][1] for i in on.tolist()])))
             if len(basis) == rank:
                 break
@@ -110,8 +108,8 @@ def _closed(
     """Simple cycles of a chain and the shortest paths from a root to its two ends, longer than `low`, up to `high`.
 
     The shortest first, and each once: of those that are closed from several roots the first. It is known by the sum of
-    random codes of its chains, and is simple if its paths start apart. With its length and chain come the vertices
-    before each on the paths from its root, and that.
+    random codes of its chains, and is simple if its paths start apart. Its length and chain come with what is before
+    each vertex on the paths from its root, and that.
     """
     (a, b), m, chosen = ends.T, graph.shape[0], list(shortest.values())
     codes, code = np.random.default_rng(0).integers(1 << 62, size=len(lengths)), np.zeros(graph.shape, np.int64)
@@ -142,11 +140,8 @@ def _walk(chains: list[list[int]]) -> list[int]:
     first, *rest = chains
     walk = list(first)
     while rest:
-        for i, chain in enumerate(rest):
-            if walk[-1] in (chain[0], chain[-1]):
-                walk += chain[1:] if chain[0] == walk[-1] else chain[-2::-1]
-                del rest[i]
-                break
+        chain = rest.pop(next(i for i, chain in enumerate(rest) if walk[-1] in (chain[0], chain[-1])))
+        walk += chain[1:] if chain[0] == walk[-1] else chain[-2::-1]
     return walk[:-1]
 
 
@@ -177,9 +172,7 @@ def places_inside(points: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
     return _grid(low + (np.arange(n)[:, None] + 0.5) / n * (high - low), *ends) @ axes + middle, axes
 
 
-def _flattened(
-    points: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray], np.ndarray, np.ndarray]:
+def _flattened(points: Floats) -> tuple[Floats, Floats, tuple[Floats, Floats], Floats, Floats]:
     """Middle and axes of a closed polygon's plane; in these both ends of its edges, and its box in the plane."""
     middle = points.mean(axis=0)
     axes = np.linalg.svd(points - middle, full_matrices=False)[2]

@@ -52,8 +52,7 @@ def mutual_pairs(points: np.ndarray, neighbours: np.ndarray, left: np.ndarray, n
     there = left.take(candidates)
     there[:, 0] = False
     nearest[stale] = candidates[np.arange(len(stale)), np.argmax(there, axis=1)]
-    rows = np.arange(len(points))
-    one = np.flatnonzero(left & (rows < nearest))
+    one = np.flatnonzero(left & (np.arange(len(points)) < nearest))
     one = one[nearest[nearest[one]] == one]
     other = nearest[one]
     ways = [points.take(neighbours[p, -1], axis=0) - points.take(p, axis=0) for p in (one, other)]

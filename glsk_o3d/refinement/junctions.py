@@ -78,17 +78,16 @@ def _places(
     found = {}
     for junction in sorted(limbs.at):
         name, here = limbs.signature(junction), limbs.at[junction]
-        body, paths = None, [limbs.paths[limb] for limb in here]
-        if handles and any(map(handles.on_loop, paths)):
-            body = handles.body(paths)
+        paths = [limbs.paths[limb] for limb in here]
+        body = handles.body(paths) if handles and any(map(handles.on_loop, paths)) else None
         follows = [handles.follow(path, body) if handles and body else None for path in paths]
         followed = sum(line is not None for line in follows)
         if name in known and not followed:
             found[junction] = known[name]
             continue
         lines, radius, around = [], 0.0, []
-        for limb, line in zip(here, follows, strict=True):
-            path, along = limbs.paths[limb], arc_lengths(limbs.vertices[limbs.paths[limb]])
+        for limb, path, line in zip(here, paths, follows, strict=True):
+            along = arc_lengths(limbs.vertices[path])
             others = [limbs.paths[k] for k in here if limbs.branch[k] != limbs.branch[limb]]
             radius_of = limbs.radius[limbs.branch[limb]]
             line = line or limb_line(limbs.vertices, limbs.surface, path, radius_of, others)

@@ -40,19 +40,16 @@ def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
     known, wires = dict[bytes, LoopEvidence](), None
     while True:
         cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
-        names, members = [skeleton.vertices[cycle].tobytes() for cycle in cycles], [set(c.tolist()) for c in cycles]
-        tubes = evidence.tubes(skeleton, cycles)
+        names, tubes = [skeleton.vertices[cycle].tobytes() for cycle in cycles], evidence.tubes(skeleton, cycles)
         narrow = [evidence.circle(skeleton.vertices[c])[1] < WIDE_LOOP * t for c, t in zip(cycles, tubes, strict=True)]
-        wires = _is_frame_of_wires(skeleton, cycles, narrow) if wires is None else wires
+        members = [set() if slim else set(c.tolist()) for c, slim in zip(cycles, narrow, strict=True)]
+        wires = _is_frame_of_wires(skeleton, [*set[int]().union(*members)]) if wires is None else wires
         loops, cut, used, left = dict[int, LoopEvidence](), [], set[int](), [*range(len(cycles))]
         while left:  # each waits for those before it; two cuts in what two loops share would tear a piece out of it
-            asked, waiting, before = list[int](), [], set[int]()
+            asked, waiting, before = list[int](), list[int](), set[int]()
             for i in left:
-                if narrow[i] or before.isdisjoint(members[i]):
-                    asked.append(i)
-                else:
-                    waiting.append(i)
-                before.update(() if narrow[i] else members[i])
+                (asked if before.isdisjoint(members[i]) else waiting).append(i)
+                before |= members[i]
             ask = partial(loop_facts, skeleton, evidence=evidence)
             answers = ask_once(known, [names[i] for i in asked], [cycles[i] for i in asked], ask)
             for i, loop in zip(asked, answers, strict=True):
@@ -95,11 +92,9 @@ class LoopEvidence(NamedTuple):
         return self._replace(facts=self.facts | dict(bonds=float(np.log(1 + 0.1))), inside=LEAST_INSIDE)
 
 
-def _is_frame_of_wires(skeleton: Skeleton, cycles: list[np.ndarray], narrow: list[bool]) -> bool:
-    """Whether most has no surface and is on wide loops, as in no crown, and does not fill space, as noise does."""
-    thin, wide = skeleton.confidence < UNSURE_CONFIDENCE, np.zeros(len(skeleton.vertices), bool)
-    for cycle, is_narrow in zip(cycles, narrow, strict=True):
-        wide[cycle] |= not is_narrow
+def _is_frame_of_wires(skeleton: Skeleton, wide: list[int]) -> bool:
+    """Whether most has no surface and is on `wide` loops, as in no crown, and does not fill space, as noise does."""
+    thin = skeleton.confidence < UNSURE_CONFIDENCE
     if thin.mean() <= MAJORITY or thin[wide].sum() <= WIRES_ON_LOOPS * thin.sum():
         return False
     cloud = SpacedPoints(skeleton)
@@ -225,8 +220,7 @@ def crossings(place: np.ndarray, n: int, bonds: tuple[np.ndarray, np.ndarray], c
     some = np.flatnonzero(place >= 0)
     start, stop = np.searchsorted(pairs[:, 0], [some, some + 1])  # bonds are in the order of their first vertices
     rows = np.arange((stop - start).sum()) + np.repeat(stop - np.cumsum(stop - start), stop - start)
-    pairs, weight = pairs[rows], weight[rows]
-    first, last = np.sort(place[pairs], axis=1).T
+    (first, last), weight = np.sort(place[pairs[rows]], axis=1).T, weight[rows]
     inside = first >= 0
     first, last, weight = first[inside], last[inside], weight[inside]
     around = closed & (last - first > n / 2)
@@ -256,10 +250,8 @@ def facing_pairs(points: np.ndarray, labels: np.ndarray) -> np.ndarray:
         np.arange(first, first + (last - first) % n + 1) % n,
         np.arange(first, first - (first - last) % n - 1, -1) % n,
     ]
-    along = []
-    for side in sides:
-        travelled = arc_lengths(points[side])
-        along.append(travelled / travelled[-1])
+    travelled = [arc_lengths(points[side]) for side in sides]
+    along = [each / each[-1] for each in travelled]
     nearest = np.abs(along[0][:, None] - along[1][None])
     pairs = [(i, int(np.argmin(nearest[i]))) for i in range(1, len(sides[0]) - 1)]
     pairs += [(int(np.argmin(nearest[:, j])), j) for j in range(1, len(sides[1]) - 1)]

@@ -116,22 +116,16 @@ def _facts(
     surface = cloud.distance
     outside = [_outside(skeleton.vertices, path, surface[path[0]], wide) for _, path in found]
     half = np.array([np.average(wide[part], weights=count[part]) for part in outside])
-    protrusions = np.zeros(len(found))
-    for i, ((k, path), part) in enumerate(zip(found, outside, strict=True)):
+    beside = _beside(evidence, skeleton.vertices, sections.across, [path for _, path in found], half)
+    for (k, path), part, own_half, shared in zip(found, outside, half, beside, strict=True):
+        junction, body = int(path[0]), path[1:]
         own = cloud.points[cloud.members.of(part)]
         # by how far they are, and not as they come, which depends on how the object is turned
-        points = own[np.argsort(norm(own - skeleton.vertices[path[0]]))][:: len(own) // SPUR_POINTS + 1]
-        out = max(_standing_out(limbs, k, int(path[0]), points, ending), 0.0) if half[i] > 0 else 0.0
-        protrusions[i] = np.log(out / max(half[i], TINY) + LEAST_OUT)
-    long = np.flatnonzero(protrusions > 0)
-    if len(long):
-        paths = [found[i][1] for i in long]
-        beside = _beside(evidence, skeleton.vertices, sections.across, paths, half[long])
-        protrusions[long] -= beside * protrusions[long]
-    for (_, path), protrusion in zip(found, protrusions.tolist(), strict=True):
-        junction, body = int(path[0]), path[1:]
+        points = own[np.argsort(norm(own - skeleton.vertices[junction]))][:: len(own) // SPUR_POINTS + 1]
+        out = max(_standing_out(limbs, k, junction, points, ending), 0.0) if own_half > 0 else 0.0
+        protrusion = float(np.log(out / max(own_half, TINY) + LEAST_OUT))
         yield dict(
-            protrusion=protrusion,
+            protrusion=protrusion - float(shared) * max(protrusion, 0),
             certainty=-float(np.log1p(-np.average(confidence[body], weights=count[body]))),
             roundness=float(roundness[junction]),
         )
