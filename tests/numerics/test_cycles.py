@@ -125,7 +125,7 @@ def test_candidates_are_simple_cycles_each_closed_once(seed, monkeypatch):
     monkeypatch.setattr(cycles_module, "_closed", lambda *given: asked.append(given) or closed(*given))
     _, lengths = basis_of(graph)
     (graph, _, high, ends, weights, shortest), cycles, before_total = asked[-1], [], 0.0
-    for total, e, before, root in closed(graph, 0.0, high, ends, weights, shortest):
+    for total, e, before, root in closed(graph, -np.inf, high, ends, weights, shortest):
         assert before_total <= total <= high
         before_total, chains = total, [e]
         for v in ends[e].tolist():
@@ -152,3 +152,15 @@ def test_slices_of_roots_and_lengths_give_one_basis(seed, monkeypatch):
     monkeypatch.setattr(cycles_module, "ROOTS_CHUNK", 1)
     for one, other in zip(cycles, basis_of(graph)[0], strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+def test_edges_without_length():
+    """Of vertices in one place: there is a basis all the same."""
+    graph = nx.circular_ladder_graph(8)
+    for lengths in (np.zeros(24), np.where(np.arange(24) % 3, 1.0, 0.0)):
+        edges = np.array(sorted(map(sorted, graph.edges)))
+        cycles = minimum_cycle_basis(16, edges, lengths)
+        assert len(cycles) == 24 - 16 + 1
+        assert all(
+            graph.has_edge(*step) for c in cycles for step in zip(c.tolist(), np.roll(c, -1).tolist(), strict=True)
+        )
