@@ -12,7 +12,6 @@ from .paths import maximal_paths
 from .vectors import TINY, Floats, Ints, dot
 
 ROOTS_CHUNK = 2**20  # speed: pairs of a root and a chain at a time: memory stays flat
-
 Chain: TypeAlias = tuple[float, list[int]]
 """The length of a path and its vertices."""
 Chains: TypeAlias = dict[tuple[int, int], int]
@@ -108,8 +107,7 @@ def _closed(
     """Simple cycles of a chain and the shortest paths from a root to its two ends, longer than `low`, up to `high`.
 
     The shortest first, and each once: of those that are closed from several roots the first. It is known by the sum of
-    random codes of its chains, and is simple if its paths start apart. Its length and chain come with what is before
-    each vertex on the paths from its root, and that.
+    random codes of its chains, and is simple if its paths start apart. The third array leads back to its root.
     """
     (a, b), m, chosen = ends.T, graph.shape[0], list(shortest.values())
     codes, code = np.random.default_rng(0).integers(1 << 62, size=len(lengths)), np.zeros(graph.shape, np.int64)
