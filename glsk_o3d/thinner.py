@@ -101,7 +101,7 @@ def thin(points: np.ndarray, neighbours: np.ndarray, n: int) -> np.ndarray:
 
     def choose(pairs: Pairs, mass: np.ndarray) -> Pairs:
         kept, swallowed = pairs
-        too_many = np.count_nonzero(mass) - n
+        too_many = np.count_nonzero(mass > 0) - n
         if len(kept) <= too_many:
             return pairs
         nearest = np.argsort(((points[kept] - points[swallowed]) ** 2).sum(axis=1), kind="stable")[:too_many]

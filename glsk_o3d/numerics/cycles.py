@@ -1,5 +1,6 @@
 """Cycles of a graph embedded in space, and how wide they open."""
 
+from collections.abc import Iterator
 from typing import TypeAlias
 
 import numpy as np
@@ -10,6 +11,7 @@ from .groups import component_labels, group_sum
 from .paths import maximal_paths
 from .vectors import TINY, Floats, Ints, dot
 
+ROOTS_CHUNK = 2**20  # speed: pairs of a root and a chain at a time: memory stays flat
 Chain: TypeAlias = tuple[float, list[int]]
 """The length of a path and its vertices."""
 Chains: TypeAlias = dict[tuple[int, int], int]
@@ -66,60 +68,69 @@ def _horton(chains: list[Chain]) -> list[Chain]:
     """Minimum cycle basis of the multigraph of chains between different junctions."""
     if not chains:
         return []
-    junctions = sorted({v for _, chain in chains for v in (chain[0], chain[-1])})
-    index = {v: i for i, v in enumerate(junctions)}
-    ends = np.array([(index[chain[0]], index[chain[-1]]) for _, chain in chains])
+    ends = np.unique([(chain[0], chain[-1]) for _, chain in chains], return_inverse=True)[1].reshape(-1, 2)
     lengths = np.array([length for length, _ in chains])
     order = np.argsort(lengths, kind="stable")
     shortest: Chains = {}
     for e in order[::-1].tolist():  # of parallel chains the shortest stays
         a, b = ends[e].tolist()
         shortest[a, b] = shortest[b, a] = e
-    m, keys = len(junctions), np.array(list(shortest))
+    m, keys = int(ends.max()) + 1, np.array(list(shortest))
     graph = csr_matrix((lengths[list(shortest.values())], keys.T), shape=(m, m))
-    distance, before = dijkstra(graph, return_predecessors=True)
-    rank = len(chains) - m + component_labels(m, ends).max() + 1
-    totals, root, closing = _closed(distance, before, ends, lengths, shortest)
+    rank, high = len(chains) - m + component_labels(m, ends).max() + 1, -np.inf
     basis, pivots = list[tuple[float, list[int]]](), dict[int, int]()
-    for total, top, e in zip(totals.tolist(), root.tolist(), closing.tolist(), strict=True):
-        if len(basis) == rank:
-            break
-        cycle, above = 1 << e, before[top]
-        for v in ends[e].tolist():
-            while v != top:
-                u = int(above[v])
-                cycle |= 1 << shortest[u, v]
-                v = u
-        reduced = cycle
-        while reduced and (pivot := reduced.bit_length()) in pivots:
-            reduced ^= pivots[pivot]
-        if reduced:
-            pivots[reduced.bit_length()] = reduced
-            basis.append((total, _walk([chains[i][1] for i in range(len(chains)) if cycle >> i & 1])))
+    while len(basis) < rank and high < lengths.sum():  # in a large graph most cycles of a basis are short
+        low, high = high, max(2 * high, 4 * lengths.mean())
+        for total, e, before, top in _closed(graph, low, high, ends, lengths, shortest):
+            cycle = 1 << e
+            for v in ends[e].tolist():
+                while v != top:
+                    u = int(before[v])
+                    cycle |= 1 << shortest[u, v]
+                    v = u
+            reduced = cycle
+            while reduced and (pivot := reduced.bit_length()) in pivots:
+                reduced ^= pivots[pivot]
+            if reduced:
+                pivots[reduced.bit_length()] = reduced
+                on = np.frombuffer(cycle.to_bytes(len(chains) // 8 + 1, "little"), np.uint8)
+                on = np.flatnonzero(np.unpackbits(on, bitorder="little"))
+                basis.append((total, _walk([chains[i][1] for i in on.tolist()])))
+            if len(basis) == rank:
+                break
     return basis
 
 
-def _closed(distance: Floats, before: Ints, ends: Ints, lengths: Floats, shortest: Chains) -> tuple[Floats, Ints, Ints]:
-    """Simple cycles of a chain and the shortest paths from a root to its two ends: lengths, roots, chains.
+def _closed(
+    graph: csr_matrix, low: float, high: float, ends: Ints, lengths: Floats, shortest: Chains
+) -> Iterator[tuple[float, int, Ints, int]]:
+    """Simple cycles of a chain and the shortest paths from a root to its two ends, longer than `low`, up to `high`.
 
     The shortest first, and each once: of those that are closed from several roots the first. It is known by the sum of
-    random codes of its chains, and is simple if its paths start apart.
+    random codes of its chains, and is simple if its paths start apart. The third array leads back to its root.
     """
-    (a, b), root, chosen = ends.T, np.arange(len(distance))[:, None], list(shortest.values())
-    codes, code = np.random.default_rng(0).integers(1 << 62, size=len(lengths)), np.zeros(distance.shape, np.int64)
+    (a, b), m, chosen = ends.T, graph.shape[0], list(shortest.values())
+    codes, code = np.random.default_rng(0).integers(1 << 62, size=len(lengths)), np.zeros(graph.shape, np.int64)
     code[tuple(np.array(list(shortest)).T)] = codes[chosen]
-    up = np.where(before < 0, root, before)
-    apart = ~(np.isin(np.arange(len(lengths)), chosen) & ((up[:, b] == a) | (up[:, a] == b)))
-    first, name = np.where(up == root, root.T, up), code[up, root.T]
-    while (up != root).any():  # twice as far up at a time
-        name ^= np.take_along_axis(name, up, axis=1)
-        up, first = (np.take_along_axis(each, each, axis=1) for each in (up, first))
-    totals = distance[:, a] + distance[:, b] + lengths
-    order = np.flatnonzero(apart & (first[:, a] != first[:, b]) & np.isfinite(totals))
-    order = order[np.argsort(totals.ravel()[order], kind="stable")]
-    names = (name[:, a] ^ name[:, b] ^ codes).ravel()[order]
-    order = order[np.sort(np.unique(names, return_index=True)[1])]
-    return totals.ravel()[order], *np.divmod(order, len(lengths))
+    alone, above, found = ~np.isin(np.arange(len(lengths)), chosen), [], []
+    for start in range(0, m, max(ROOTS_CHUNK // len(lengths), 1)):
+        root = np.arange(m)[start : start + max(ROOTS_CHUNK // len(lengths), 1), None]
+        # what rounding adds to half of a cycle must not put it out of reach
+        distance, before = dijkstra(graph, indices=root[:, 0], return_predecessors=True, limit=(0.5 + 1e-9) * high)
+        up, each = np.where(before < 0, root, before), np.arange(m)
+        first, name = np.where(up == root, each, up), code[up, each]
+        apart, totals = alone | ((up[:, b] != a) & (up[:, a] != b)), distance[:, a] + distance[:, b] + lengths
+        while (up != root).any():  # twice as far up at a time
+            name ^= np.take_along_axis(name, up, axis=1)
+            up, first = (np.take_along_axis(table, table, axis=1) for table in (up, first))
+        row, e = np.nonzero(apart & (first[:, a] != first[:, b]) & (low < totals) & (totals <= high))
+        above.append(before)
+        found.append((totals[row, e], e, row + start, name[row, a[e]] ^ name[row, b[e]] ^ codes[e]))
+    total, e, top, name = (np.concatenate(part) for part in zip(*found, strict=True))
+    before, order = np.concatenate(above), np.argsort(total, kind="stable")
+    order = order[np.sort(np.unique(name[order], return_index=True)[1])]
+    for number, chain, root in zip(total[order].tolist(), e[order].tolist(), top[order].tolist(), strict=True):
+        yield number, chain, before[root], root
 
 
 def _walk(chains: list[list[int]]) -> list[int]:
@@ -127,11 +138,8 @@ def _walk(chains: list[list[int]]) -> list[int]:
     first, *rest = chains
     walk = list(first)
     while rest:
-        for i, chain in enumerate(rest):
-            if walk[-1] in (chain[0], chain[-1]):
-                walk += chain[1:] if chain[0] == walk[-1] else chain[-2::-1]
-                del rest[i]
-                break
+        chain = rest.pop(next(i for i, chain in enumerate(rest) if walk[-1] in (chain[0], chain[-1])))
+        walk += chain[1:] if chain[0] == walk[-1] else chain[-2::-1]
     return walk[:-1]
 
 
@@ -162,9 +170,7 @@ def places_inside(points: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
     return _grid(low + (np.arange(n)[:, None] + 0.5) / n * (high - low), *ends) @ axes + middle, axes
 
 
-def _flattened(
-    points: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray], np.ndarray, np.ndarray]:
+def _flattened(points: Floats) -> tuple[Floats, Floats, tuple[Floats, Floats], Floats, Floats]:
     """Middle and axes of a closed polygon's plane; in these both ends of its edges, and its box in the plane."""
     middle = points.mean(axis=0)
     axes = np.linalg.svd(points - middle, full_matrices=False)[2]

@@ -23,9 +23,10 @@ def merge_pairs(
     pairs and the mass of every point: how many it stands for, at most `most`; 0 if it was swallowed. Returned is the
     point that each was merged into, (n,) int array; itself for those that are left.
     """
-    representative, mass = np.arange(len(points)), np.ones(len(points))
-    while np.count_nonzero(mass) > least:
-        kept, swallowed = choose(mutual_pairs(points, neighbours, (mass > 0) & (mass + 1 <= most)), mass)
+    representative, mass, nearest = np.arange(len(points)), np.ones(len(points)), neighbours[:, 1].copy()
+    while np.count_nonzero(mass > 0) > least:  # of truth values it is faster
+        left = (mass > 0) & (mass + 1 <= most)
+        kept, swallowed = choose(mutual_pairs(points, neighbours, left, nearest), mass)
         if len(kept) == 0:
             break
         representative[swallowed] = kept
@@ -41,16 +42,18 @@ def final_representatives(representative: np.ndarray) -> np.ndarray:
     return representative
 
 
-def mutual_pairs(points: np.ndarray, neighbours: np.ndarray, left: np.ndarray) -> Pairs:
-    """Pairs of points left that are each other's nearest; of each pair the one with more room around it is kept."""
-    rows = np.flatnonzero(left)
-    candidates = neighbours.take(rows, axis=0)[:, 1:]
+def mutual_pairs(points: np.ndarray, neighbours: np.ndarray, left: np.ndarray, nearest: np.ndarray) -> Pairs:
+    """Pairs of points left that are each other's nearest; of each pair the one with more room around it is kept.
+
+    The `nearest` (n,) of a point, itself if none of its neighbours is left, is looked up again if it is not left.
+    """
+    stale = np.flatnonzero(left & ~left.take(nearest))
+    candidates = neighbours.take(stale, axis=0)
     there = left.take(candidates)
-    first = np.argmax(there, axis=1)
-    found, nearest = there[np.arange(len(rows)), first], np.full(len(points), -1)
-    nearest[rows[found]] = candidates[found, first[found]]
-    one = rows[found]
-    one = one[(nearest[nearest[one]] == one) & (one < nearest[one])]
+    there[:, 0] = False
+    nearest[stale] = candidates[np.arange(len(stale)), np.argmax(there, axis=1)]
+    one = np.flatnonzero(left & (np.arange(len(points)) < nearest))
+    one = one[nearest[nearest[one]] == one]
     other = nearest[one]
     ways = [points.take(neighbours[p, -1], axis=0) - points.take(p, axis=0) for p in (one, other)]
     swap = dot(ways[1], ways[1]) > dot(ways[0], ways[0])

@@ -10,8 +10,9 @@ from typing import Any, TypeVar
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..numerics.cycles import inscribed_circle
 from ..numerics.diffusion import Diffusion
-from ..numerics.groups import first_in_their_place, group_rank
+from ..numerics.groups import first_in_their_place, group_rank, quantile
 from ..numerics.morton import morton_order
 from ..numerics.neighbourhoods import nearest_neighbours, uprightness
 from ..numerics.polylines import incident_edges, nearest_on_edges, places_on_edges
@@ -19,6 +20,7 @@ from ..numerics.vectors import TINY, dot
 from ..numerics.winding import AREA_NEIGHBOURS, orient_from_axis, point_areas, winding_number
 from ..skeleton import Skeleton
 from .merging import with_fields
+from .sections import VertexPoints
 
 # fitted: winding number below which an axis is in little; .5 on that of a tube seen from one side, .2 in sparse crowns
 LEAST_INSIDE = 0.4
@@ -98,6 +100,7 @@ class Evidence(SurfaceGraph):
     normals: np.ndarray  # (n, 3) unit vectors that point outward
     _said: dict[str, tuple[Skeleton, Any]] = field(default_factory=dict, repr=False)
     _wound: dict[bytes, float] = field(default_factory=dict, repr=False)
+    _circles: dict[bytes, tuple[np.ndarray, float]] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(cls, skeleton: Skeleton, surface: SurfaceGraph | None = None) -> Evidence:
@@ -152,6 +155,15 @@ class Evidence(SurfaceGraph):
         between them, cos^2 times sin^2 times sin^2: not where surfaces of two parts face each other.
         """
         return self._once("bonds", skeleton, lambda: self._bonds(skeleton))
+
+    def tubes(self, skeleton: Skeleton, cycles: list[np.ndarray]) -> list[float]:
+        """Median distance of the surface along each of some loops of the skeleton."""
+        surface = self._once("surface", skeleton, lambda: VertexPoints(skeleton).distance)
+        return [max(quantile(surface[cycle]), TINY) for cycle in cycles]
+
+    def circle(self, loop: np.ndarray) -> tuple[np.ndarray, float]:
+        """The `inscribed_circle` of a loop, (n, 3): of each it is asked once."""
+        return ask_once(self._circles, [loop.tobytes()], [loop], lambda fresh: map(inscribed_circle, fresh))[0]
 
     def _once(self, what: str, skeleton: Skeleton, ask: Callable[[], Any]) -> Any:
         """What was said of the same skeleton before, or is now."""

@@ -73,22 +73,22 @@ def _places(
     found = {}
     for junction in sorted(limbs.at):
         name, here = limbs.signature(junction), limbs.at[junction]
-        looped = handles is not None and any(handles.on_loop(limbs.paths[limb]) for limb in here)
-        if name in known and not looped:
+        paths = [limbs.paths[limb] for limb in here]
+        body = handles.body(paths) if handles and any(map(handles.on_loop, paths)) else None
+        follows = [handles.follow(path, body) if handles and body else None for path in paths]
+        followed = sum(line is not None for line in follows)
+        if name in known and not followed:
             found[junction] = known[name]
             continue
         lines, radius, around = [], 0.0, []
-        body = handles.body([limbs.paths[limb] for limb in here]) if handles and looped else None
-        for limb in here:
-            path, along = limbs.paths[limb], arc_lengths(limbs.vertices[limbs.paths[limb]])
+        for limb, path, line in zip(here, paths, follows, strict=True):
+            along = arc_lengths(limbs.vertices[path])
             others = [limbs.paths[k] for k in here if limbs.branch[k] != limbs.branch[limb]]
             radius_of = limbs.radius[limbs.branch[limb]]
-            line = handles.follow(path, body) if handles and body else None
             line = line or limb_line(limbs.vertices, limbs.surface, path, radius_of, others)
             lines.append(line)
             radius = max(radius, float(np.interp(line.start, along, limbs.surface[path])))
             around.append(path[along <= along[-1] / 2])
-        followed = sum(len(line.lead) > 1 for line in lines)
         if len(lines) == 2 and followed < 2:  # no junction, but in a body of which a handle is not known
             continue
         own = cloud.members.of(np.unique(np.concatenate(around)))

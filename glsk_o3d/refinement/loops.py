@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..decisions import QUESTIONS, Decision
-from ..numerics.cycles import inscribed_circle, minimum_cycle_basis, places_inside
+from ..numerics.cycles import minimum_cycle_basis, places_inside
 from ..numerics.groups import component_labels, group_rank, quantile
 from ..numerics.near_links import link_growth
 from ..numerics.polylines import arc_lengths
@@ -18,7 +18,6 @@ from ..skeleton import Skeleton
 from .diagnostics import MAJORITY
 from .evidence import LEAST_INSIDE, Evidence, ask_once
 from .merging import collapse_triangles, drop_edges, merge_vertices
-from .sections import VertexPoints
 from .thin_parts import SURFACE_GROWTH, UNSURE_CONFIDENCE, SpacedPoints
 
 WIDE_LOOP = 1.4  # fitted: surface distances, the radius of a loop that is more than two strands in one part
@@ -33,36 +32,44 @@ WALL_SECTORS = 16  # precision: directions around a place in which walls are loo
 def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Decision]]:
     """Close the loops that are handles with a probability of less than `least`, until there are none.
 
-    Narrow ones, two strands in one part, are collapsed; wide ones are cut where the fewest bonds cross. There is one
-    decision for each loop of the minimum cycle bases, closed or left.
+    Narrow ones, two strands in one part, are collapsed; wide ones are cut where the fewest bonds cross. Those that
+    share a vertex with one that is cut are asked about later, if they are still there. There is one decision for each
+    loop that was closed, and for each of the minimum cycle basis that is left.
     """
     decisions: list[Decision] = []
     known, wires = dict[bytes, LoopEvidence](), None
     while True:
         cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
-        names = [skeleton.vertices[cycle].tobytes() for cycle in cycles]
-        loops = ask_once(known, names, cycles, partial(loop_facts, skeleton, evidence=evidence))
-        kept, narrow, cut, used = list[Decision](), [], [], set[int]()
-        wires = _is_frame_of_wires(skeleton, cycles, loops) if wires is None else wires
-        for cycle, loop in zip(cycles, loops, strict=True):
-            if wires and (skeleton.confidence[cycle] < UNSURE_CONFIDENCE).mean() > MAJORITY:
-                loop = loop.without_normals()
-            false = loop.probability < least
-            where = tuple(loop.centre.tolist())
-            (decisions if false else kept).append(Decision("loop", where, loop.probability, false))
-            if not false:
-                continue
-            if loop.is_narrow:
-                narrow.append(cycle)
-            elif used.isdisjoint(cycle.tolist()):  # two cuts in what two loops share would tear a piece out of it
-                cut.append(sorted((cycle[loop.weakest], cycle[(loop.weakest + 1) % len(cycle)])))
-                used.update(cycle.tolist())
-        if not narrow and not cut:
-            return skeleton, decisions + kept
+        names, tubes = [skeleton.vertices[cycle].tobytes() for cycle in cycles], evidence.tubes(skeleton, cycles)
+        narrow = [evidence.circle(skeleton.vertices[c])[1] < WIDE_LOOP * t for c, t in zip(cycles, tubes, strict=True)]
+        members = [set() if slim else set(c.tolist()) for c, slim in zip(cycles, narrow, strict=True)]
+        wires = _is_frame_of_wires(skeleton, [*set[int]().union(*members)]) if wires is None else wires
+        loops, cut, used, left = dict[int, LoopEvidence](), [], set[int](), [*range(len(cycles))]
+        while left:  # each waits for those before it; two cuts in what two loops share would tear a piece out of it
+            asked, waiting, before = list[int](), list[int](), set[int]()
+            for i in left:
+                (asked if before.isdisjoint(members[i]) else waiting).append(i)
+                before |= members[i]
+            ask = partial(loop_facts, skeleton, evidence=evidence)
+            answers = ask_once(known, [names[i] for i in asked], [cycles[i] for i in asked], ask)
+            for i, loop in zip(asked, answers, strict=True):
+                if wires and (skeleton.confidence[cycles[i]] < UNSURE_CONFIDENCE).mean() > MAJORITY:
+                    loop = loop.without_normals()
+                loops[i] = loop
+                if loop.probability < least and not narrow[i]:
+                    cut.append(np.sort(cycles[i][[loop.weakest, (loop.weakest + 1) % len(cycles[i])]]))
+                    used |= members[i]
+            left = [i for i in waiting if used.isdisjoint(members[i])]
+        rows = [(i, loop, loop.probability < least) for i, loop in sorted(loops.items())]
+        found = [Decision("loop", tuple(loop.centre.tolist()), loop.probability, false) for _, loop, false in rows]
+        decisions += [each for each in found if each.changed]
+        closed = [cycles[i] for i, _, false in rows if false and narrow[i]]
+        if not closed and not cut:
+            return skeleton, decisions + found
         if cut:
             skeleton = drop_edges(skeleton, cut)
-        if narrow:
-            pairs = np.concatenate([facing_pairs(skeleton.vertices[cycle], cycle) for cycle in narrow])
+        if closed:
+            pairs = np.concatenate([facing_pairs(skeleton.vertices[cycle], cycle) for cycle in closed])
             labels = component_labels(len(skeleton.vertices), pairs)
             skeleton = collapse_triangles(merge_vertices(skeleton, labels))
 
@@ -72,7 +79,6 @@ class LoopEvidence(NamedTuple):
 
     facts: dict[str, float]
     inside: float  # median winding number along it
-    is_narrow: bool  # two strands in one part
     centre: np.ndarray  # of its hole
     weakest: int  # position of the edge, from there to the next vertex, that the fewest bonds cross
 
@@ -86,11 +92,9 @@ class LoopEvidence(NamedTuple):
         return self._replace(facts=self.facts | dict(bonds=float(np.log(1 + 0.1))), inside=LEAST_INSIDE)
 
 
-def _is_frame_of_wires(skeleton: Skeleton, cycles: list[np.ndarray], loops: list[LoopEvidence]) -> bool:
-    """Whether most has no surface and is on wide loops, as in no crown, and does not fill space, as noise does."""
-    thin, wide = skeleton.confidence < UNSURE_CONFIDENCE, np.zeros(len(skeleton.vertices), bool)
-    for cycle, loop in zip(cycles, loops, strict=True):
-        wide[cycle] |= not loop.is_narrow
+def _is_frame_of_wires(skeleton: Skeleton, wide: list[int]) -> bool:
+    """Whether most has no surface and is on `wide` loops, as in no crown, and does not fill space, as noise does."""
+    thin = skeleton.confidence < UNSURE_CONFIDENCE
     if thin.mean() <= MAJORITY or thin[wide].sum() <= WIRES_ON_LOOPS * thin.sum():
         return False
     cloud = SpacedPoints(skeleton)
@@ -111,18 +115,16 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
     """
     if not cycles:
         return []
-    surface = VertexPoints(skeleton).distance
-    tubes = [max(quantile(surface[cycle]), TINY) for cycle in cycles]
     bonds, spacing = evidence.bonds(skeleton), max(evidence.spacing, TINY)
-    loops = [skeleton.vertices[cycle] for cycle in cycles]
+    loops, tubes = [skeleton.vertices[cycle] for cycle in cycles], evidence.tubes(skeleton, cycles)
     views = [_View(loop, tube, evidence) for loop, tube in zip(loops, tubes, strict=True)]
     vertices, which = np.unique(np.concatenate(cycles), return_inverse=True)  # loops of a lattice share most of theirs
     along = evidence.winding_at(skeleton.vertices[vertices])[which]
     medians = [quantile(each) for each in np.split(along, np.cumsum([len(loop) for loop in loops[:-1]]))]
     falls = _falls(views, np.array(medians), evidence)
     found = []
-    for cycle, tube, view, inside, fall in zip(cycles, tubes, views, medians, falls, strict=True):
-        crossing = crossings(positions(cycle, len(surface)), len(cycle), bonds, closed=True)
+    for cycle, view, inside, fall in zip(cycles, views, medians, falls, strict=True):
+        crossing = crossings(positions(cycle, len(skeleton.vertices)), len(cycle), bonds, closed=True)
         best = int(np.argmax(view.sight * fall))
         passage = min(view.sight[best] / spacing, CLEAR_SIGHT) * min(fall[best], view.walls(best))
         facts = dict(
@@ -130,8 +132,7 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
             passage=float(np.log(passage + 0.3)),
             bonds=float(np.log(crossing.min() / max(quantile(crossing), TINY) + 0.1)),
         )
-        narrow = view.radius < WIDE_LOOP * tube
-        found.append(LoopEvidence(facts, inside, narrow, view.centre, int(np.argmin(crossing))))
+        found.append(LoopEvidence(facts, inside, view.centre, int(np.argmin(crossing))))
     return found
 
 
@@ -149,19 +150,21 @@ class _View:
     """
 
     def __init__(self, loop: np.ndarray, tube: float, evidence: Evidence) -> None:
-        self.centre, self.radius = inscribed_circle(loop)
+        self.centre, self.radius = evidence.circle(loop)
         self.places, axes = places_inside(loop, LOOP_GRID)
         if not len(self.places):
             self.places = self.centre[None]
         self._places, self._evidence, self._axes = (self.places - self.centre) @ axes[:2].T, evidence, axes
         extent = np.linalg.norm(loop - self.centre, axis=1).max() + tube
         self._half = self.radius + tube  # of what stands in the way, along the normal
-        self._see(2 * extent)
-        if (self.sight > self._clear).any():
-            self._see(np.inf)
+        self._reaches = iter((extent, 2 * extent, np.inf))
+        self._see()
+        while (self.sight > self._clear).any():
+            self._see()
 
-    def _see(self, reach: float) -> None:
-        """Take up the points so near to the centre in the plane: from each place all in a circle, which is `_clear`."""
+    def _see(self) -> None:
+        """Take up points farther from the centre in the plane: from each place all in a circle, which is `_clear`."""
+        reach = next(self._reaches)
         rows = self._evidence.near(self.centre, float(np.hypot(reach, self._half)))
         points = (self._evidence.points[rows] - self.centre) @ self._axes.T
         near = np.abs(points[:, 2]) < self._half
@@ -180,7 +183,7 @@ class _View:
         nearest = order[np.unique(sector[order], return_index=True)[1]]
         clear = self._clear[place]
         if clear < np.inf and (len(nearest) < WALL_SECTORS or distance[nearest].max() >= clear):
-            self._see(np.inf)
+            self._see()
             return self.walls(place)
         cosine = np.abs((self._normals[nearest] * way[nearest]).sum(axis=1)) / np.maximum(distance[nearest], TINY)
         return float(cosine.sum() / WALL_SECTORS)
@@ -214,7 +217,10 @@ def crossings(place: np.ndarray, n: int, bonds: tuple[np.ndarray, np.ndarray], c
     closed, edges lead from each position to the next, and bonds the shorter way; else the last one is none.
     """
     pairs, weight = bonds
-    first, last = np.sort(place[pairs], axis=1).T
+    some = np.flatnonzero(place >= 0)
+    start, stop = np.searchsorted(pairs[:, 0], [some, some + 1])  # bonds are in the order of their first vertices
+    rows = np.arange((stop - start).sum()) + np.repeat(stop - np.cumsum(stop - start), stop - start)
+    (first, last), weight = np.sort(place[pairs[rows]], axis=1).T, weight[rows]
     inside = first >= 0
     first, last, weight = first[inside], last[inside], weight[inside]
     around = closed & (last - first > n / 2)
@@ -244,10 +250,8 @@ def facing_pairs(points: np.ndarray, labels: np.ndarray) -> np.ndarray:
         np.arange(first, first + (last - first) % n + 1) % n,
         np.arange(first, first - (first - last) % n - 1, -1) % n,
     ]
-    along = []
-    for side in sides:
-        travelled = arc_lengths(points[side])
-        along.append(travelled / travelled[-1])
+    travelled = [arc_lengths(points[side]) for side in sides]
+    along = [each / each[-1] for each in travelled]
     nearest = np.abs(along[0][:, None] - along[1][None])
     pairs = [(i, int(np.argmin(nearest[i]))) for i in range(1, len(sides[0]) - 1)]
     pairs += [(int(np.argmin(nearest[:, j])), j) for j in range(1, len(sides[1]) - 1)]

@@ -124,13 +124,13 @@ def test_candidates_are_simple_cycles_each_closed_once(seed, monkeypatch):
     closed = cycles_module._closed
     monkeypatch.setattr(cycles_module, "_closed", lambda *given: asked.append(given) or closed(*given))
     _, lengths = basis_of(graph)
-    _, before, ends, weights, shortest = asked[0]
-    cycles = []
-    for total, root, e in zip(*closed(*asked[0]), strict=True):
-        chains = [int(e)]
+    (graph, _, high, ends, weights, shortest), cycles, before_total = asked[-1], [], 0.0
+    for total, e, before, root in closed(graph, -np.inf, high, ends, weights, shortest):
+        assert before_total <= total <= high
+        before_total, chains = total, [e]
         for v in ends[e].tolist():
             while v != root:
-                u = int(before[root, v])
+                u = int(before[v])
                 chains.append(shortest[u, v])
                 v = u
         assert len(chains) == len(set(chains))
@@ -138,3 +138,29 @@ def test_candidates_are_simple_cycles_each_closed_once(seed, monkeypatch):
         np.testing.assert_allclose(total, weights[chains].sum())
         cycles.append(frozenset(chains))
     assert len(cycles) == len(set(cycles)) >= len(lengths)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_slices_of_roots_and_lengths_give_one_basis(seed, monkeypatch):
+    """A ladder with one long way around: the last cycle of its basis is longer than any other."""
+    graph = weighted(nx.circular_ladder_graph(40), np.random.default_rng(seed), whole=seed % 2 == 1)
+    asked, closed = [], cycles_module._closed
+    monkeypatch.setattr(cycles_module, "_closed", lambda *given: asked.append(given) or closed(*given))
+    cycles, total = basis_of(graph)
+    assert len(asked) > 2
+    np.testing.assert_allclose(total, expected(graph))
+    monkeypatch.setattr(cycles_module, "ROOTS_CHUNK", 1)
+    for one, other in zip(cycles, basis_of(graph)[0], strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_edges_without_length():
+    """Of vertices in one place: there is a basis all the same."""
+    graph = nx.circular_ladder_graph(8)
+    for lengths in (np.zeros(24), np.where(np.arange(24) % 3, 1.0, 0.0)):
+        edges = np.array(sorted(map(sorted, graph.edges)))
+        cycles = minimum_cycle_basis(16, edges, lengths)
+        assert len(cycles) == 24 - 16 + 1
+        assert all(
+            graph.has_edge(*step) for c in cycles for step in zip(c.tolist(), np.roll(c, -1).tolist(), strict=True)
+        )
