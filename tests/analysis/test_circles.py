@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from glsk_o3d.analysis.circles import fit_circle
+from glsk_o3d.analysis.forestry import fit_circle
 
 
 def arc(degrees, n, noise, rng, radius=1.0, centre=(5.0, 7.0)):
