@@ -54,7 +54,7 @@ def reporting(cloud: Path | None = None, *, quiet: bool = False, verbose: bool =
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="replace")  # a file name that the terminal cannot show is no reason to fail
     problem: BaseException | None = None
-    with _log_as_lines(), _warnings_as_lines():
+    with _as_lines():
         try:
             yield
         except (GlskError, OSError, MemoryError, KeyboardInterrupt) as error:
@@ -78,33 +78,28 @@ def reporting(cloud: Path | None = None, *, quiet: bool = False, verbose: bool =
 
 
 @contextmanager
-def _warnings_as_lines() -> Iterator[None]:
-    """Say in the end each of our own warnings once, whatever Python's filters are."""
+def _as_lines() -> Iterator[None]:
+    """Say what the library logs: all, or its warnings, or its errors alone; in the end our own Python warnings.
+
+    Each of these is said once, whatever Python's filters are.
+    """
     ours = SkeletonWarning, PluginWarning
+    log, handler = logging.getLogger("glsk_o3d"), logging.Handler()
+    handler.emit = lambda record: say(record.levelname.lower(), record.getMessage())  # type: ignore[method-assign]
+    before = log.level
+    log.setLevel(logging.DEBUG if flags.verbose else logging.ERROR if flags.quiet else logging.WARNING)
+    log.addHandler(handler)
     with warnings.catch_warnings(record=True) as caught:
         for category in ours:
             warnings.simplefilter("always", category)
         try:
             yield
         finally:
+            log.removeHandler(handler)
+            log.setLevel(before)
             told = dict.fromkeys(str(it.message) for it in caught if issubclass(it.category, ours))
             for line in () if flags.quiet else told:
                 say("warning", line)
     for it in caught:
         if not issubclass(it.category, ours):
             warnings.showwarning(it.message, it.category, it.filename, it.lineno)
-
-
-@contextmanager
-def _log_as_lines() -> Iterator[None]:
-    """What the library logs, on stderr: all of it, or its warnings, or only its errors."""
-    log, handler = logging.getLogger("glsk_o3d"), logging.Handler()
-    handler.emit = lambda record: say(record.levelname.lower(), record.getMessage())  # type: ignore[method-assign]
-    before = log.level
-    log.setLevel(logging.DEBUG if flags.verbose else logging.ERROR if flags.quiet else logging.WARNING)
-    log.addHandler(handler)
-    try:
-        yield
-    finally:
-        log.removeHandler(handler)
-        log.setLevel(before)
