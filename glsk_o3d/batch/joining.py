@@ -229,19 +229,6 @@ def _covered(values: np.ndarray, theirs: Samples) -> np.ndarray:
     return (distance <= np.fmax(values[:, 5], theirs.scale[nearest])) & ~past
 
 
-def _sampled(strands: Strands, first: int) -> Samples:
-    """Places along strands whose vertices are numbered from `first`."""
-    places, edges = strands.values[:, :3], strands.edges
-    scale = np.fmax(np.fmin(*strands.values[edges, 5].T), np.finfo(float).tiny)
-    step = np.fmax(SAMPLE_STEP * scale, norm(places[edges[:, 1]] - places[edges[:, 0]]) / MOST_SAMPLES)
-    row, part = pieces(places, edges, step) if len(edges) else (np.empty(0, int), np.empty(0))
-    between = along(edges, row, part, strands.values) if len(edges) else np.empty((0, 8))
-    values = np.concatenate([strands.values, between])
-    vertex = np.concatenate([np.arange(len(places)), edges[row, (part > 0.5).astype(int)]])
-    outward = np.concatenate([strands.outward(), np.zeros((len(row), 3))])
-    return Samples(values[:, :3], values[:, 5], first + vertex, outward)
-
-
 class _Joint:
     """What has been brought so far. Vertices are numbered through."""
 
@@ -264,7 +251,15 @@ class _Joint:
         if inner.any():
             assert theirs is not None
             self._meet({first + at: strands.values[at] for at in np.flatnonzero(inner).tolist()}, theirs)
-        return _sampled(strands, first)
+        places, edges = strands.values[:, :3], strands.edges
+        scale = np.fmax(np.fmin(*strands.values[edges, 5].T), np.finfo(float).tiny)
+        step = np.fmax(SAMPLE_STEP * scale, norm(places[edges[:, 1]] - places[edges[:, 0]]) / MOST_SAMPLES)
+        row, part = pieces(places, edges, step) if len(edges) else (np.empty(0, int), np.empty(0))
+        between = along(edges, row, part, strands.values) if len(edges) else np.empty((0, 8))
+        values = np.concatenate([strands.values, between])
+        vertex = np.concatenate([np.arange(len(places)), edges[row, (part > 0.5).astype(int)]])
+        outward = np.concatenate([strands.outward(), np.zeros((len(row), 3))])
+        return Samples(values[:, :3], values[:, 5], first + vertex, outward)
 
     def _meet(self, ends: dict[int, np.ndarray], theirs: Samples) -> None:
         """Match cut ends with open ones, the nearest first, one to one; others touch what is nearest."""
