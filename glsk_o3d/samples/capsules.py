@@ -44,8 +44,8 @@ class Sample:
         return f"Sample({self.name!r}, {counts})"
 
 
-def check(n: Any, noise: float, **positive: float) -> None:
-    """Raise InvalidParameterError for a wrong number of points, noise, or length or angle by its name."""
+def generator(n: Any, noise: float, seed: Any, **positive: float) -> np.random.Generator:
+    """The random numbers of a sample; InvalidParameterError for a wrong n, noise, or length or angle by its name."""
     if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
         raise InvalidParameterError(f"n = {n!r}: must be an int of at least 1")
     if not (np.isfinite(noise) and noise >= 0):
@@ -53,6 +53,7 @@ def check(n: Any, noise: float, **positive: float) -> None:
     for name, value in positive.items():
         if not (np.isfinite(value) and value > 0):
             raise InvalidParameterError(f"{name} = {value!r}: must be finite and above 0")
+    return np.random.default_rng(seed)
 
 
 def collect(draw: Callable[[int], np.ndarray], n: int) -> np.ndarray:
@@ -128,8 +129,7 @@ def union_sample(
     name: str, nodes: Floats, edges: np.ndarray, radii: Floats, n: int, noise: float, seed: int, cameras: Any = None
 ) -> Sample:
     """n points, uniform by area, on the outer surface of the union, as far as one of the cameras sees it."""
-    check(n, noise)
-    rng = np.random.default_rng(seed)
+    rng = generator(n, noise, seed)
     a, b = nodes[edges[:, 0]], nodes[edges[:, 1]]
     ra, rb = radii[edges[:, 0]], radii[edges[:, 1]]
     length = np.linalg.norm(b - a, axis=1)
