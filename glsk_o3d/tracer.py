@@ -10,7 +10,7 @@ from .numerics.vectors import AXES
 from .parameters import documented, parameter
 from .pipeline import Filter, Watch
 from .refinement.diagnostics import measured
-from .refinement.evidence import in_order, on_distinct
+from .refinement.evidence import in_order
 from .refinement.thin_parts import may_lack_surface
 from .refinement.tracing import trace
 from .skeleton import Skeleton
@@ -69,7 +69,4 @@ class Tracer(Filter[Skeleton]):
     def _run(self, given: Skeleton, watch: Watch | None) -> Skeleton:
         if self.root is None and not (self.surface and may_lack_surface(given, self.surface)):
             return given  # as most are: sorting many points would take longer than all else
-        return on_distinct(lambda some: in_order(self._traced, some), given)
-
-    def _traced(self, skeleton: Skeleton) -> Skeleton:
-        return measured(trace(skeleton, self.surface, self.root))
+        return in_order(lambda some: measured(trace(some, self.surface, self.root)), given, distinct=True)

@@ -206,12 +206,6 @@ def on_sample(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skele
     return on_rows(step, skeleton, rows)
 
 
-def on_distinct(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skeleton:
-    """What a step makes of a skeleton with one point in every place."""
-    rows = np.flatnonzero(skeleton.vertex_of_point >= 0)
-    return on_rows(step, skeleton, rows[first_in_their_place(skeleton.points[rows])])
-
-
 def on_rows(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton, rows: np.ndarray) -> Skeleton:
     """What a step makes of a skeleton with some of its input points alone, `rows` (n,), in their order.
 
@@ -235,13 +229,14 @@ def on_rows(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton, rows: np.n
     return with_fields(made, points=skeleton.points, normals=normals, vertex_of_point=owner)
 
 
-def in_order(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skeleton:
+def in_order(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton, distinct: bool = False) -> Skeleton:
     """What a step makes of a skeleton whose points are along a Morton curve, whatever order they came in.
 
     That would show in the last digit of sums, and where one thing is as good as another, as on grids, it decides. In
-    the result the points are as they came.
+    the result the points are as they came. The step may have one point alone of every `distinct` place.
     """
     rows = np.flatnonzero(skeleton.vertex_of_point >= 0)
+    rows = rows[first_in_their_place(skeleton.points[rows])] if distinct else rows
     return on_rows(step, skeleton, rows[morton_order(skeleton.points[rows])] if len(rows) else rows)
 
 
