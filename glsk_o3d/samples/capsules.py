@@ -44,7 +44,7 @@ class Sample:
         return f"Sample({self.name!r}, {counts})"
 
 
-def generator(n: Any, noise: float, seed: Any, **positive: float) -> np.random.Generator:
+def checked_generator(n: Any, noise: float, seed: Any, **positive: float) -> np.random.Generator:
     """The random numbers of a sample; InvalidParameterError for a wrong n, noise, or length or angle by its name."""
     if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
         raise InvalidParameterError(f"n = {n!r}: must be an int of at least 1")
@@ -129,7 +129,7 @@ def union_sample(
     name: str, nodes: Floats, edges: np.ndarray, radii: Floats, n: int, noise: float, seed: int, cameras: Any = None
 ) -> Sample:
     """n points, uniform by area, on the outer surface of the union, as far as one of the cameras sees it."""
-    rng = generator(n, noise, seed)
+    rng = checked_generator(n, noise, seed)
     a, b = nodes[edges[:, 0]], nodes[edges[:, 1]]
     ra, rb = radii[edges[:, 0]], radii[edges[:, 1]]
     length = np.linalg.norm(b - a, axis=1)

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from ..errors import InvalidParameterError
-from .capsules import Floats, Sample, directions, generator, union_sample
+from .capsules import Floats, Sample, checked_generator, directions, union_sample
 
 TWO_CAMERAS = ((1.1, 1.8, 1.4), (-1.2, -1.7, 1.3))
 """Where the sauropod is scanned from: front left and rear right, a little above it."""
@@ -35,7 +35,7 @@ def y_junction(
     >>> y_junction(500)
     Sample('y_junction', 500 points, 4 nodes, 3 edges)
     """
-    generator(n, noise, seed, stem=radii[0], left=radii[1], right=radii[2])
+    checked_generator(n, noise, seed, stem=radii[0], left=radii[1], right=radii[2])
     sine, cosine = np.sin(np.deg2rad(40)), np.cos(np.deg2rad(40))
     nodes = 0.5 * np.array([[0, 0, 0], [0, 0, -1], [-sine, 0, cosine], [sine, 0, cosine]])
     edges = np.array([[0, 1], [0, 2], [0, 3]])
@@ -141,7 +141,7 @@ def tree(
     >>> tree(500, forks=2)
     Sample('tree', 500 points, 43 nodes, 42 edges)
     """
-    rng = generator(n, noise, [seed, 1], length=length, radius=radius)
+    rng = checked_generator(n, noise, [seed, 1], length=length, radius=radius)
     if isinstance(forks, bool) or not isinstance(forks, int | np.integer) or not 0 <= forks <= 8:
         raise InvalidParameterError(f"forks = {forks!r}: must be an int from 0 to 8")
     nodes, edges, radii = np.zeros((1, 3)), [], np.array([radius])

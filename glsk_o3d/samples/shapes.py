@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InvalidParameterError
-from .capsules import Chain, Floats, Sample, chain, collect, directions, generator, noisy, union_sample
+from .capsules import Chain, Floats, Sample, chain, checked_generator, collect, directions, noisy, union_sample
 
 
 def tube(
@@ -30,7 +30,7 @@ def tube(
     >>> tube(500)
     Sample('tube', 500 points, 2 nodes, 1 edges)
     """
-    rng = generator(n, noise, seed, length=length, radius=radius)
+    rng = checked_generator(n, noise, seed, length=length, radius=radius)
     axis = chain([[-length / 2, 0, 0], [length / 2, 0, 0]], radius)
     if capped:
         return union_sample("tube", *axis, n, noise, seed)
@@ -52,7 +52,7 @@ def helix(n: int = 4096, *, noise: float = 0.0, seed: int = 0) -> Sample:
     >>> helix(500)
     Sample('helix', 500 points, 193 nodes, 192 edges)
     """
-    rng = generator(n, noise, seed)
+    rng = checked_generator(n, noise, seed)
     coil, radius, pitch, turns = 0.3, 0.06, 0.35, 2.0  # of the axis, of the wire, rise per turn
     climb = pitch / (2 * np.pi)
     speed = np.hypot(coil, climb)
@@ -100,7 +100,7 @@ def torus(n: int = 4096, *, ring_radius: float = 0.4, radius: float = 0.1, noise
     >>> torus(500)
     Sample('torus', 500 points, 128 nodes, 128 edges)
     """
-    rng = generator(n, noise, seed, ring_radius=ring_radius, radius=radius)
+    rng = checked_generator(n, noise, seed, ring_radius=ring_radius, radius=radius)
     if radius >= ring_radius:
         raise InvalidParameterError(f"radius = {radius}: must be below ring_radius = {ring_radius}")
     points, (nodes, edges, radii) = _ring(n, ring_radius, radius, rng)
@@ -120,7 +120,7 @@ def two_rings(n: int = 4096, *, noise: float = 0.0, seed: int = 0) -> Sample:
     >>> two_rings(500)
     Sample('two_rings', 500 points, 256 nodes, 256 edges)
     """
-    rng = generator(n, noise, seed)
+    rng = checked_generator(n, noise, seed)
     points, (nodes, edges, radii) = _ring(n, 0.3, 0.06, rng)
 
     def second(x: Floats) -> Floats:  # turned about x, and moved so that it goes through the middle of the first
@@ -158,7 +158,7 @@ def sphere(n: int = 4096, *, noise: float = 0.0, seed: int = 0) -> Sample:
     >>> sphere(500)
     Sample('sphere', 500 points, 1 nodes, 0 edges)
     """
-    rng = generator(n, noise, seed)
+    rng = checked_generator(n, noise, seed)
     points = 0.5 * directions(n, rng)
     return Sample(noisy(points, noise, rng), *chain(np.zeros((1, 3)), 0.5), "sphere")
 
@@ -178,7 +178,7 @@ def sheet(n: int = 4096, *, bend: float = 60.0, noise: float = 0.0, seed: int = 
     >>> sheet(500)
     Sample('sheet', 500 points, 0 nodes, 0 edges)
     """
-    rng = generator(n, noise, seed)
+    rng = checked_generator(n, noise, seed)
     if not 0 <= bend < 360:
         raise InvalidParameterError(f"bend = {bend}: must be at least 0 and below 360 degrees")
     along, across = rng.uniform(-0.5, 0.5, n), rng.uniform(-0.35, 0.35, n)

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from glsk_o3d.errors import InvalidParameterError, did_you_mean
 from glsk_o3d.numerics.groups import component_labels
 from glsk_o3d.numerics.vectors import norm
-from glsk_o3d.samples.capsules import check
+from glsk_o3d.samples.capsules import checked_generator
 
 from .scanning import camera_places, depth_image, lidar_scan, seen_cosines
 from .shapes import Shape, Thing
@@ -66,7 +66,7 @@ def cloud(shape: Shape, variant: str, n: int = 4096, seed: int = 0) -> np.ndarra
     """
     if not isinstance(variant, str) or variant not in DRAWN_FOR:
         raise InvalidParameterError(did_you_mean(str(variant), VARIANTS, "variant of clouds"))
-    check(n, 0)
+    checked_generator(n, 0, 0)  # refuses a wrong n
     check_seed(seed)
     rng = generator("cloud", shape.name, variant, n, seed)
     look = generator("eyes", shape.name, variant, seed)
