@@ -148,12 +148,15 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
 
     section = mean((skeleton.radii / np.nanmax(skeleton.radii, initial=np.finfo(float).tiny)) ** 2)
     volume = length * np.where(np.isnan(section), 1, section)
-    parent, level, backwards = _grow(skeleton, paths, length, volume, chosen)
+    at: dict[int, list[int]] = {}  # the rows of the paths that end at a vertex
+    for row, path in enumerate(paths):
+        for vertex in {int(path[0]), int(path[-1])}:
+            at.setdefault(vertex, []).append(row)
+    parent, level, backwards = _grow(skeleton, paths, at, length, volume, chosen)
     outward = [path[::-1] if turn else path for path, turn in zip(paths, backwards, strict=True)]
     start, end = (np.array([path[i] for path in outward]) for i in (0, -1))
     first, last = skeleton.vertices[start], skeleton.vertices[end]
     label = branch_of_point(skeleton, skeleton.points, skeleton.vertex_of_point)
-    at = _paths_at(paths)
     angle = np.array([_angle(skeleton, outward, at, i, parent[i]) for i in range(len(paths))])
     mean_radius = mean(skeleton.radii)
     axis, order = _axes(parent, level, start, angle, mean_radius, length)
@@ -180,24 +183,15 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
     )
 
 
-def _paths_at(paths: list[np.ndarray]) -> dict[int, list[int]]:
-    """The rows of the paths that end at a vertex."""
-    at: dict[int, list[int]] = {}
-    for row, path in enumerate(paths):
-        for vertex in {int(path[0]), int(path[-1])}:
-            at.setdefault(vertex, []).append(row)
-    return at
-
-
 def _grow(
-    skeleton: Skeleton, paths: list[np.ndarray], length: np.ndarray, volume: np.ndarray, chosen: int | None
+    skeleton: Skeleton, paths: list[Ints], at: dict[int, list[int]], length: Floats, volume: Floats, chosen: int | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Parent and level of every path, and whether it runs towards the root: three (B,) arrays.
 
     Paths are reached from the roots, the nearest first. `chosen` is the root vertex of its component, or None; other
     components grow from the path with the most `volume`.
     """
-    ends, at = [(int(path[0]), int(path[-1])) for path in paths], _paths_at(paths)
+    ends = [(int(path[0]), int(path[-1])) for path in paths]
     parent, level, backwards = np.full(len(paths), -1), np.full(len(paths), -1), np.zeros(len(paths), bool)
     component = skeleton.component_of_vertex[[pair[0] for pair in ends]]
     queue: list[tuple[float, int, int]] = []  # distance, vertex, and the path that leads there
