@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from .analysis.comparison import matched
-from .analysis.curves import along, pieces
+from .analysis.curves import places_along
 from .decisions import Supported
 from .driver import PipelineChoice, chosen_pipeline
 from .errors import InvalidCloudError, SkeletonWarning
@@ -22,7 +22,7 @@ from .numerics.polylines import arc_lengths, place_at
 from .numerics.vectors import TINY, norm
 from .parameters import check_number
 from .pipeline import Pipeline
-from .report import Report, warn
+from .report import warn
 from .skeleton import Skeleton, of_input
 
 SAMPLE_SHARE = 0.8  # fitted: of the points in each sample; halves doubt more that is right
@@ -160,7 +160,9 @@ def _supported(skeleton: Skeleton, others: list[Skeleton]) -> Skeleton:
     supported += _lacking(missing, len(curves))
     report = replace(skeleton.report, n_draws=len(curves), n_agreeing=same, support=tuple(supported))
     if same <= WORTH_A_WARNING * len(curves):
-        report = report.with_warning(_doubt(report))
+        weak = f", above all {report.unsupported[0]}: look there" if report.unsupported else ""
+        others = f"{len(curves) - same} of {len(curves)} samples of the cloud"
+        report = report.with_warning(f"uncertain: {others} have a skeleton with another graph{weak}")
         warn(report.warnings[-1:])
     return replace(skeleton, support=support, report=report)
 
@@ -183,14 +185,6 @@ def _lacking(missing: list[_Missing], draws: int) -> Iterator[Supported]:
             yield _part(about, place[these].mean(axis=0), share, present=False)
 
 
-def _doubt(report: Report) -> str:
-    """What to say of a skeleton that another sample would not give."""
-    other = report.n_draws - report.n_agreeing
-    message = f"uncertain: {other} of {report.n_draws} samples of the cloud have a skeleton with another graph"
-    weak = report.unsupported
-    return f"{message}, above all {weak[0]}: look there" if weak else message
-
-
 class _Curve:
     """A skeleton as places along its curves."""
 
@@ -201,8 +195,7 @@ class _Curve:
         self.loops = minimum_cycle_basis(len(self.vertices), self.edges, skeleton.edge_lengths)
         self._lengths = skeleton.edge_lengths
         step = np.maximum(STEP * self.reach[self.edges].min(axis=1, initial=np.inf), self._lengths / MOST_PIECES)
-        edge, share = pieces(self.vertices, self.edges, step)
-        self._places = cKDTree(np.concatenate([self.vertices, along(self.edges, edge, share, self.vertices)]))
+        self._places = cKDTree(np.concatenate([self.vertices, places_along(skeleton, step)[1]]))
 
     def shows(self, places: np.ndarray, reach: np.ndarray) -> np.ndarray:
         """Whether the curve comes within reach of places, (k,) bool array."""
