@@ -46,10 +46,7 @@ class Ledger:
 
     def rewrite(self) -> None:
         """Write one line per input, in the order of the names, in the place of all that was there."""
-        rows = sorted(self.rows.items())
-        self.rows.clear()
-        self.rows.update(rows)
-        data = b"".join(map(_line, self.rows.values()))
+        data = b"".join(_line(row) for _, row in sorted(self.rows.items()))
         write_atomically(self.path, lambda temporary: temporary.write_bytes(data))
 
     def add(self, row: Row) -> None:

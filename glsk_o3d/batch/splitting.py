@@ -69,7 +69,17 @@ def divide(path: Path, folder: Path, cut: Cut, of: list[Any]) -> Split:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     try:
-        split = _divided(path, folder, cut, of)
+        grid, counts = _grid(path, cut), Counter[str]()
+        points = kept = 0
+        for scan in map(Scan.by_area, read_blocks(path, where=cut.where)):
+            points += len(scan)
+            scan = scan[finite_rows(scan.positions)]
+            kept += len(scan)
+            rows = {tile_name(tile): chosen for tile, chosen in grid.parted(scan.positions)}
+            if (n := len(counts.keys() | rows.keys())) > MOST_TILES:
+                raise InvalidParameterError(f"has {n} tiles or more: give larger ones")
+            add_to_parts(folder, scan, rows, counts)
+        split = Split(of, tuple(sorted(counts, key=tile_of)), points, points - kept, grid)
         write_json(folder / PARTS_FILE, asdict(split))
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
@@ -89,21 +99,6 @@ def add_to_parts(folder: Path, scan: Scan, rows: Mapping[str, np.ndarray], count
     table = ply.rows_of(columns)
     for label, chosen in rows.items():
         counts[label] = ply.append(folder / f"{label}.ply", table[chosen], counts[label])
-
-
-def _divided(path: Path, folder: Path, cut: Cut, of: list[Any]) -> Split:
-    """Hand out the points of a scene to the files of its parts, a block at a time."""
-    grid, counts = _grid(path, cut), Counter[str]()
-    points = kept = 0
-    for scan in map(Scan.by_area, read_blocks(path, where=cut.where)):
-        points += len(scan)
-        scan = scan[finite_rows(scan.positions)]
-        kept += len(scan)
-        rows = {tile_name(tile): chosen for tile, chosen in grid.parted(scan.positions)}
-        if (n := len(counts.keys() | rows.keys())) > MOST_TILES:
-            raise InvalidParameterError(f"has {n} tiles or more: give larger ones")
-        add_to_parts(folder, scan, rows, counts)
-    return Split(of, tuple(sorted(counts, key=tile_of)), points, points - kept, grid)
 
 
 def _grid(path: Path, cut: Cut) -> Grid:
