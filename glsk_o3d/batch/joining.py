@@ -295,7 +295,10 @@ class _Joint:
         gone, ends = _stubs(values, edges, ends)
         alive[gone] = False
         edges = edges[alive[edges].all(axis=1)]
-        ends = ends[_unmet(values[ends], np.concatenate(self.met))]
+        met = np.concatenate(self.met)
+        if len(met):  # where an end of the object is beside a cut end, another tile saw it: there is nothing to meet
+            distance, nearest = cKDTree(met[:, :3]).query(values[ends, :3])
+            ends = ends[distance > values[ends, 5] + met[nearest, 5]]
         seams = Seams(len(other) + len(touching) - len(loose), len(ends), self.thickest)
         number, kept, none = np.cumsum(alive) - 1, values[alive], np.empty((0, 3))
         edges = simple_edges(number[edges])
@@ -325,14 +328,6 @@ def _stubs(values: np.ndarray, edges: np.ndarray, ends: np.ndarray) -> tuple[lis
         else:
             left.append(end)
     return gone, np.array(left, np.int64)
-
-
-def _unmet(ends: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Which cut ends have no end of the object beside them that another tile saw."""
-    if not len(ends) or not len(others):
-        return np.ones(len(ends), bool)
-    distance, nearest = cKDTree(others[:, :3]).query(ends[:, :3])
-    return distance > ends[:, 5] + others[nearest, 5]
 
 
 def inside(values: np.ndarray, low: np.ndarray, high: np.ndarray, by: np.ndarray | float = 0.0) -> np.ndarray:
