@@ -74,11 +74,9 @@ def _print(facts: dict[str, Any], *, full: bool) -> None:
     flow = f"{facts['consumes']} -> {facts['produces']}" if facts["kind"] == "filter" else facts["kind"]
     echo(f"{facts['name']}  {flow}" + f", from {facts['plugin']}" * bool(facts["plugin"]), bold=True)
     print_table([[facts["doc"] if full else facts["doc"].partition("\n\n")[0]]], wrap=True)
-    rows = [("", facts["expression"])] if facts["kind"] == "pipeline" else map(_parameter_row, facts["parameters"])
+    rows = [("", facts["expression"])] if facts["kind"] == "pipeline" else []
+    for each in facts.get("parameters", ()):
+        default = "none" if each["default"] is None else each["default"]
+        rows.append((f"  {each['name']}", f"{each['doc']}\n{allowed_values(each)}; default {default}"))
     print_table(rows, wrap=True)
     echo()
-
-
-def _parameter_row(parameter: dict[str, Any]) -> tuple[str, str]:
-    default = "none" if parameter["default"] is None else parameter["default"]
-    return f"  {parameter['name']}", f"{parameter['doc']}\n{allowed_values(parameter)}; default {default}"
