@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from .eigen import principal_parts
-from .neighbourhoods import nearest_neighbours, scatter
+from .neighbourhoods import nearest_neighbours, principal
 from .vectors import TINY, norm
 
 ROW_PLACES = 500  # speed: places at which rows are looked for
@@ -27,16 +26,13 @@ def reach_next_rows(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
         return neighbours
     distance, around = nearest_neighbours(points, max(min(k << DOUBLINGS, n // 4), k), of=points[places])
     sizes = k << np.arange(DOUBLINGS + 1)  # more than a quarter of a cloud is no neighbourhood
-    if not any(_mostly_planar(points, around[:, :size]) for size in sizes[sizes <= around.shape[1]]):
+    for size in sizes[sizes <= around.shape[1]]:
+        third, second, first = np.sqrt(principal(points, around[:, :size])[0].T)
+        if 2 * np.count_nonzero(second - third > np.maximum(first - second, third)) > len(places):
+            break  # most are rather planar than linear or scattered
+    else:
         return neighbours
     on_row = few * distance / np.maximum(near, TINY)[:, None]
     reached = np.arange(distance.shape[1]) >= NEXT_ROWS * on_row
     reached[:, :k], reached[:, -1] = False, True
     return nearest_neighbours(points, int(np.median(reached.argmax(axis=1))) + 1)[1]
-
-
-def _mostly_planar(points: np.ndarray, neighbours: np.ndarray) -> bool:
-    """Whether most neighbourhoods are rather planar than linear or scattered."""
-    third, second, first = np.sqrt(np.maximum(principal_parts(scatter(points, neighbours))[0], 0))
-    planar = second - third > np.maximum(first - second, third)
-    return bool(2 * np.count_nonzero(planar) > len(planar))
