@@ -12,10 +12,10 @@ from ..skeleton import Skeleton
 MOST_ON_A_CURVE = 10**7  # derived: on a curve; the arrays of so many take a gigabyte
 
 
-def pieces(nodes: np.ndarray, edges: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+def pieces(nodes: np.ndarray, edges: np.ndarray, step: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
     """Edges cut into equal pieces no longer than `step`: the edge of each piece, and how far along it its middle is.
 
-    Without edges every node stands for itself; `along` knows.
+    Each edge may have a step of its own. Without edges every node stands for itself; `along` knows.
     """
     if len(edges) == 0:
         return np.arange(len(nodes)), np.zeros(len(nodes))
@@ -54,10 +54,10 @@ def distances(curve: Skeleton, other: Skeleton, step: float) -> tuple[np.ndarray
     return distance, np.maximum((radius + radius_there[nearest]) / 2, step)
 
 
-def places_along(skeleton: Skeleton, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def places_along(skeleton: Skeleton, step: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places along a skeleton, at most `step` apart: the edge of each, (n,), where it is, (n, 3), and its radius, (n,).
 
-    Without edges these are the vertices.
+    Each edge may have a step of its own. Without edges these are the vertices.
     """
     row, part = pieces(skeleton.vertices, skeleton.edges, step)
     place, radius = (along(skeleton.edges, row, part, values) for values in (skeleton.vertices, skeleton.radii))
