@@ -64,9 +64,10 @@ class OutlierRemover(Filter[Points]):
         if not self.outlier_factor:
             return points
         points.check_whole(self)
-        left, neighbours, n_mixed, doubtful = inliers(
-            points.cloud, points.weight, points.neighbours, self.outlier_factor, MIN_POINTS, points.spread
-        )
+        cloud, weight, neighbours, factor = points.cloud, points.weight, points.neighbours, self.outlier_factor
+        distance = mean_distances(cloud, neighbours)
+        mixed, doubtful = mixed_pixels(points, distance, factor)
+        left, neighbours = inliers(cloud, weight, neighbours, distance, mixed, factor, MIN_POINTS)
         if doubtful:
             points = replace(points, report=points.report.with_warning(MIXED_OR_TWIGS))
         if len(left) == len(points):
@@ -74,33 +75,30 @@ class OutlierRemover(Filter[Points]):
         gone = np.ones(len(points), bool)
         gone[left] = False
         rest = points.without(gone, neighbours)
-        return replace(rest, report=replace(rest.report, n_mixed=n_mixed))
+        return replace(rest, report=replace(rest.report, n_mixed=int(mixed.sum())))
 
 
 def inliers(
     points: np.ndarray,
     weight: np.ndarray,
     neighbours: np.ndarray,
+    distance: np.ndarray,
+    mixed: np.ndarray,
     factor: float,
     least: int,
-    spread: np.ndarray | None = None,
-) -> tuple[np.ndarray, np.ndarray, int, bool]:
+) -> tuple[np.ndarray, np.ndarray]:
     """The points left when those far from all others are set aside, round by round.
 
-    An outlier is `factor` times farther from its neighbours than these are from theirs. Where there are many, its
-    neighbours are outliers, too; then what floats in space goes, see `in_floating_cluster`. At least `least` points are
-    left. Returned are their rows (m,), ascending, their nearest neighbours among those left, (m, k), the number of
-    mixed pixels, which go in the first round if the `spread` (n, 3) of the neighbourhoods is known, and whether there
-    may be others.
+    An outlier is `factor` times farther from its neighbours than these are from theirs, by the mean `distance` (n,).
+    Where there are many, its neighbours are outliers, too; then what floats in space goes, see `in_floating_cluster`.
+    At least `least` points are left. `mixed` pixels (n,) go in the first round. Returned are the rows (m,) of those
+    left, ascending, and their nearest neighbours among these, (m, k).
     """
-    left, distance, n_mixed, doubtful = np.arange(len(points)), mean_distances(points, neighbours), 0, False
+    left = np.arange(len(points))
     for _ in range(MOST_ROUNDS):  # what is left of a cluster stands out once the rest is gone
         # as near as the neighbours would be if all were there
         mean = distance / np.sqrt(weight[left].take(neighbours).mean(axis=1))
-        found = local_outlier_ratio(mean, neighbours) > factor
-        if spread is not None:
-            mixed, doubtful = mixed_pixels(mean, neighbours, spread, factor)
-            found, n_mixed, spread = found | mixed, int(mixed.sum()), None
+        found = (local_outlier_ratio(mean, neighbours) > factor) | mixed[left]
         if mean.max() > FLOATING_RATIO * mean.min():  # else none can float
             found |= in_floating_cluster(points[left], weight[left], mean, neighbours)
         keep = np.flatnonzero(~found)
@@ -112,12 +110,10 @@ def inliers(
         distance, neighbours, there = distance[keep], index[neighbours[keep, :k]], points[left]
         near, neighbours[changed] = nearest_neighbours(there, k, of=there[changed])
         distance[changed] = near[:, 1:].mean(axis=1)
-    return left, neighbours, n_mixed, doubtful
+    return left, neighbours
 
 
-def mixed_pixels(
-    mean: np.ndarray, neighbours: np.ndarray, spread: np.ndarray, factor: float
-) -> tuple[np.ndarray, bool]:
+def mixed_pixels(points: Points, distance: np.ndarray, factor: float) -> tuple[np.ndarray, bool]:
     """Points that hang between the edge of a surface and what a camera saw behind it, (n,) bool array.
 
     A pixel on an edge has a depth between front and back. Such points are sparse beside a surface a few steps away,
@@ -126,7 +122,8 @@ def mixed_pixels(
     more than a few are so by far, with ``r sqrt(t) > factor``. Where little of a cloud is a surface, or too much is
     sparse, they may be twigs: then there are none, and the second result is True.
     """
-    n, (third, second, first) = len(mean), spread.T
+    n, (third, second, first), neighbours = len(points), points.spread.T, points.neighbours
+    mean = distance / np.sqrt(points.weight.take(neighbours).mean(axis=1))
     flat = (third < FILLED_THIRD * second) & (second > FILLED_SECOND * first)
     none, few = np.zeros(n, bool), max(MIXED_SHARE * n, 2 * neighbours.shape[1])
     thick = mean * np.sqrt(np.sqrt(third / np.maximum(second, TINY)))

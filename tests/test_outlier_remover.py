@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from glsk_o3d import OutlierRemover, RingBuilder, Sampler, samples, skeletonize
 from glsk_o3d.numerics.grid_sampling import sample_grid
-from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
+from glsk_o3d.numerics.neighbourhoods import mean_distances, nearest_neighbours
 from glsk_o3d.outlier_remover import inliers
 
 K, N = 16, 12000
@@ -17,7 +17,9 @@ SURFACE = samples.torus(N, ring_radius=0.4, radius=0.1).points
 
 def left(points, weight=None):
     weight = np.ones(len(points)) if weight is None else weight
-    return inliers(points, weight, nearest_neighbours(points, K)[1], 2.5, 8)[0]
+    neighbours = nearest_neighbours(points, K)[1]
+    distance = mean_distances(points, neighbours)
+    return inliers(points, weight, neighbours, distance, np.zeros(len(points), bool), 2.5, 8)[0]
 
 
 def floating(n, seed=0, reach=0.6):
