@@ -66,7 +66,7 @@ def read_cloud(
         Only points for which this holds, such as ``"classification in (2, 5) and z > 1.5"``: attributes and places,
         compared with numbers.
     sample : int, "auto" or "vertices"
-        Points by area of a mesh, as `Sampler.sample`.
+        Points by area of a mesh, as of `Sampler`.
 
     Returns
     -------
