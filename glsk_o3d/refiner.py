@@ -113,11 +113,7 @@ class Refiner(Filter[Skeleton]):
         return without_strays(refined) if self.air and self.bridge else refined
 
     def _refined(self, skeleton: Skeleton) -> Skeleton:
-        skeleton = collapse_triangles(skeleton, by_degree=self.collapse == "degree")
-        surface = SurfaceGraph.of(skeleton)
-        if self.recentre:
-            skeleton = pull_back_detached(skeleton)
-        skeleton = self._centred(skeleton, surface)
+        skeleton, surface = self._fit(skeleton)
         asks = self.handle or self.limb or self.air or self.bridge
         aside = None
         if _may_be_asked(skeleton) and (asks or self.recentre):
@@ -128,6 +124,14 @@ class Refiner(Filter[Skeleton]):
             grown = regrow_ends(move_junctions(scaled(skeleton, 1 / size)), self.ends == "surface")
             skeleton = scaled(grown, size)
         return measured(aside.put_back(skeleton) if aside else skeleton)
+
+    def _fit(self, skeleton: Skeleton) -> tuple[Skeleton, SurfaceGraph]:
+        """Make the graph one-dimensional and centre it in the surface around it."""
+        skeleton = collapse_triangles(skeleton, by_degree=self.collapse == "degree")
+        surface = SurfaceGraph.of(skeleton)
+        if self.recentre:
+            skeleton = pull_back_detached(skeleton)
+        return self._centred(skeleton, surface), surface
 
     def _decide(self, skeleton: Skeleton, surface: SurfaceGraph) -> tuple[Skeleton, SurfaceGraph, Aside | None]:
         """Answer one question after the other; not again where the graph is the same, or has no more loops."""
