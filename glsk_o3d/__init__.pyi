@@ -24,6 +24,7 @@ from .errors import (
     SkeletonWarning,
     StageError,
 )
+from .inscriber import Inscriber
 from .interop.clouds import Cloud
 from .io.annotation import annotate
 from .io.formats.gltf import save_rig
@@ -67,6 +68,7 @@ __all__ = [
     "FileFormatError",
     "Filter",
     "GlskError",
+    "Inscriber",
     "InvalidCloudError",
     "InvalidParameterError",
     "IterationRecord",

@@ -6,6 +6,7 @@ from typing import Any
 from .connector import Connector
 from .contractor import Contractor
 from .denoiser import Denoiser
+from .inscriber import Inscriber
 from .lpr_reducer import LPRReducer
 from .outlier_remover import OutlierRemover
 from .parameters import Parameters
@@ -115,7 +116,7 @@ PIPELINES: dict[str, Callable[[], Pipeline[Skeleton]]] = {
 BUILTIN: dict[str, type[Parameters]] = {
     cls.__name__: cls
     for cls in (
-        *(Sampler, OutlierRemover, Denoiser, Thinner, RingBuilder),
+        *(Sampler, OutlierRemover, Denoiser, Thinner, RingBuilder, Inscriber),
         *(Contractor, LPRReducer, Connector, Refiner, Tracer, ExplainedScore, RingSizeRatio),
     )
 }

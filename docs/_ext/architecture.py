@@ -21,7 +21,7 @@ ROWS = (
     {"named pipelines": ("pipelines",)},
     {
         "filters of points": ("sampler", "outlier_remover", "denoiser", "thinner", "ring_builder"),
-        "filters": ("contractor", "lpr_reducer", "connector", "refiner", "tracer", "stopping"),
+        "filters": ("inscriber", "contractor", "lpr_reducer", "connector", "refiner", "tracer", "stopping"),
     },
     {"refinement": ("refinement",), "pipeline": ("pipeline",)},
     {"what filters share": ("parameters", "points", "state", "skeleton", "report", "decisions")},

@@ -9,7 +9,7 @@ PACKAGE = Path(__file__).resolve().parents[2] / "glsk_o3d"
 ROOMS = ("numerics", "refinement")
 FILES = (
     *("points", "sampler", "outlier_remover", "denoiser", "thinner", "ring_builder"),
-    *("contractor", "lpr_reducer", "stopping", "connector", "refiner", "tracer", "decisions"),
+    *("inscriber", "contractor", "lpr_reducer", "stopping", "connector", "refiner", "tracer", "decisions"),
 )
 ORIGINS = ("published", "derived", "measured", "fitted", "speed", "precision", "warning")
 """Where numbers come from. Those for speed, such as the sizes of blocks, change no result, those of precision none when

@@ -1,0 +1,82 @@
+"""Which side of a surface is inside, and the ball that touches each of its points from there."""
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
+from scipy.spatial import cKDTree
+
+from .groups import component_labels
+from .neighbourhoods import uprightness
+from .rings import Rings
+from .vectors import TINY, Floats, dot
+
+LARGEST_BALL = 0.8  # derived: half the longest side of the working frame
+SHRUNK = 1e-3  # precision: of a radius
+VOTES = 10  # precision: rounds in which neighbours vote on a sign; noise turns some of a thousand of a spanning tree
+
+
+def outward_normals(points: np.ndarray, normals: np.ndarray, rings: Rings) -> np.ndarray:
+    """Unit normals (n, 3) with signs by which they point out of the object.
+
+    Signs spread along the spanning tree of the neighbours that agree best (Hoppe et al. 1992, "Surface reconstruction
+    from unorganized points"), where a surface goes on from one to the other; then neighbours vote. Of every piece most
+    is bent around the inside, as the wall of a hole is not.
+    """
+    n, p, q = len(points), rings.centres, rings.indices
+    agree = dot(normals.take(p, axis=0), normals.take(q, axis=0))
+    weight = np.abs(agree) * uprightness(points, normals, p, q)
+    tree = minimum_spanning_tree(csr_matrix((1 + SHRUNK - weight, (p, q)), shape=(n, n))).nonzero()
+    piece = component_labels(n, np.column_stack(tree))
+    roots = np.unique(piece, return_index=True)[1]
+    # from one more point there is one tree
+    start, stop = np.append(tree[0], np.full(len(roots), n)), np.append(tree[1], roots)
+    joined = csr_matrix((np.ones(len(start)), (start, stop)), shape=(n + 1, n + 1))
+    up = breadth_first_order(joined, n, directed=False)[1][:n]
+    up = np.where(up == n, np.arange(n), up)
+    sign = np.where(dot(normals, normals[up]) < 0, -1.0, 1.0)
+    while (up != up[up]).any():  # twice as far up at a time
+        sign, up = sign * sign[up], up[up]
+    links = csr_matrix((agree * weight * sign[p] * sign[q], (p, q)), shape=(n, n))
+    vote = np.ones(n)
+    for _ in range(VOTES):
+        vote = links @ vote
+        vote /= max(np.abs(vote).max(), TINY)
+    sign = np.where(vote < 0, -sign, sign)
+    bent = dot(points - rings.mean_over(points), normals) * sign
+    bent = np.clip(bent / max(np.median(np.abs(bent)), TINY), -3, 3)
+    return normals * (sign * np.where(np.bincount(piece, bent) < 0, -1, 1)[piece])[:, None]
+
+
+def inscribed_balls(points: np.ndarray, outward: np.ndarray) -> tuple[Floats, Floats]:
+    """Radius of the ball inside that touches each point, and the distance of its contacts over its diameter, (n,) each.
+
+    It shrinks to the sphere through the point and what is nearest to its centre, until it is empty (Ma et al. 2012, "3D
+    medial axis point approximation using nearest neighbors and the normal field"). One that met nothing has one.
+    """
+    n = len(points)
+    tree, radius, apart, row = cKDTree(points), np.full(n, LARGEST_BALL), np.zeros(n), np.arange(n)
+    while len(row):
+        distance, found = tree.query(points[row] - radius[row, None] * outward[row], 2)
+        own = found[:, 0] == row
+        other, nearest = np.where(own, found[:, 1], found[:, 0]), np.where(own, distance[:, 1], distance[:, 0])
+        way = points[other] - points[row]
+        squared, depth = dot(way, way), -dot(outward[row], way)
+        shrinks = (nearest < (1 - SHRUNK) * radius[row]) & (depth > 0)
+        row, squared, depth = row[shrinks], squared[shrinks], depth[shrinks]
+        radius[row], apart[row] = squared / (2 * depth), depth / np.sqrt(squared)
+    return radius, apart
+
+
+def medial_places(points: np.ndarray, normals: np.ndarray, rings: Rings) -> tuple[Floats, Floats]:
+    """A place on the medial axis for each point, (n, 3), and how far it is to be believed, (n,), from 0 to 1.
+
+    It is the mean of the centres of the inscribed balls over two rings. Each weighs by the squared distance of its
+    contacts over that of its diameter, which is what they say of its centre: 1 of two walls, 0 of a single flat face.
+    """
+    outward = outward_normals(points, normals, rings)
+    radius, apart = inscribed_balls(points, outward)
+    trust = apart[:, None] ** 2
+    sums = np.column_stack([trust * (points - radius[:, None] * outward), trust])
+    for _ in range(2):
+        sums = (sums + rings.sizes[:, None] * rings.mean_over(sums)) / (1 + rings.sizes[:, None])
+    return sums[:, :3] / np.maximum(sums[:, 3:], TINY), sums[:, 3]
