@@ -14,7 +14,7 @@ from .numerics.vectors import TINY, norm
 from .parameters import check_number
 from .refinement.merging import merge_into, some_vertices
 from .refinement.rooted import RootPlace, numbered_from, root_among
-from .skeleton import Skeleton
+from .skeleton import Skeleton, of_input
 
 __all__ = ["cut_loops", "largest_component", "prune", "reroot", "simplify"]
 
@@ -40,16 +40,17 @@ def largest_component(skeleton: Skeleton) -> Skeleton:
     """
     if skeleton.n_components < 2:
         return skeleton
-    part = skeleton.component_of_vertex
+    skeleton, part = skeleton.whole, skeleton.component_of_vertex
     length = np.bincount(part[skeleton.edges[:, 0]], skeleton.edge_lengths, skeleton.n_components)
     stays = part == length.argmax()
     index = np.where(stays, np.cumsum(stays) - 1, -1)
-    return replace(
+    left = replace(
         skeleton,
         **some_vertices(skeleton, stays),
         edges=index[skeleton.edges[stays[skeleton.edges[:, 0]]]],
         vertex_of_point=np.append(index, -1)[skeleton.vertex_of_point],
     )
+    return of_input(left)
 
 
 def cut_loops(skeleton: Skeleton) -> tuple[Skeleton, np.ndarray]:
@@ -78,7 +79,8 @@ def cut_loops(skeleton: Skeleton) -> tuple[Skeleton, np.ndarray]:
     left = np.sort(np.column_stack(forest.nonzero()), axis=1)
     m = len(skeleton.vertices)
     stays = np.isin(skeleton.edges @ [m, 1], left @ [m, 1])
-    return replace(skeleton, edges=skeleton.edges[stays]), skeleton.vertices[skeleton.edges[~stays]]
+    cut = of_input(replace(skeleton.whole, edges=skeleton.edges[stays]))
+    return cut, skeleton.vertices[skeleton.edges[~stays]]
 
 
 def reroot(skeleton: Skeleton, root: RootPlace = "z") -> Skeleton:
@@ -117,8 +119,8 @@ def reroot(skeleton: Skeleton, root: RootPlace = "z") -> Skeleton:
         )
     if len(skeleton.vertices) == 0:
         raise InvalidParameterError("the skeleton is empty: it has no vertex to be the root")
-    rooted = numbered_from(skeleton, root_among(skeleton.vertices, skeleton, root))
-    return replace(rooted, report=replace(rooted.report, root=tuple(rooted.vertices[0].tolist())))
+    rooted = numbered_from(skeleton.whole, root_among(skeleton.vertices, skeleton, root))
+    return of_input(replace(rooted, report=replace(rooted.report, root=tuple(rooted.vertices[0].tolist()))))
 
 
 def prune(skeleton: Skeleton, *, length: float = 0.0, order: int | None = None) -> Skeleton:
@@ -153,6 +155,7 @@ def prune(skeleton: Skeleton, *, length: float = 0.0, order: int | None = None) 
     """
     check_number("length", length, "float", low=0)
     check_number("order", order, "int?", low=0)
+    skeleton = skeleton.whole
     if order is not None:
         if skeleton.n_loops:
             trees = "branches have an order in a tree; see cut_loops (--cut-loops)"
@@ -167,7 +170,7 @@ def prune(skeleton: Skeleton, *, length: float = 0.0, order: int | None = None) 
         for path in ends:
             group[path] = path[0]
         skeleton = merge_into(skeleton, group)
-    return skeleton
+    return of_input(skeleton)
 
 
 def _short_ends(skeleton: Skeleton, least: float) -> list[np.ndarray]:
@@ -224,7 +227,7 @@ def simplify(skeleton: Skeleton, *, tolerance: float = 0.0) -> Skeleton:
         along, kept = arc_lengths(curve), np.flatnonzero(stays > tolerance)
         nearest = np.abs(along[1:-1, None] - along[kept]).argmin(axis=1)
         group[path[1:-1]] = path[kept[nearest]]
-    return merge_into(skeleton, group)
+    return of_input(merge_into(skeleton.whole, group))
 
 
 def _significance(curve: np.ndarray) -> np.ndarray:

@@ -269,6 +269,14 @@ def test_many_near_copies_are_copies(copies):
         assert len(state.cloud) == len(cloud) + len(far)
 
 
+@pytest.mark.parametrize("ratio", [1e-4, 1e-5, 1e-7])
+def test_a_small_object_beside_a_large_one_is_no_place_with_copies(ratio):
+    small, large = samples.torus(2000).points, samples.torus(4000).points
+    state = Sampler(size="all")(np.concatenate([ratio * small, large + [5, 0, 0]]))
+    assert len(state.cloud) == 6000
+    assert len(Sampler(size="all")(np.outer(np.logspace(-9, 0, 3000), [1, 2, 3])).cloud) == 3000
+
+
 def assert_equal_curves(one, other):
     for name in ("vertices", "edges", "radii"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))

@@ -1,11 +1,13 @@
 """Sampler: cloud -> points."""
 
 import dataclasses
+import json
 from itertools import pairwise
 
 import numpy as np
 import open3d as o3d
 import pytest
+from typer.testing import CliRunner
 
 import glsk_o3d as glsk
 from glsk_o3d import (
@@ -22,6 +24,7 @@ from glsk_o3d import (
     samples,
 )
 from glsk_o3d.analysis import Gripper, grasp_candidates
+from glsk_o3d.cli.main import app
 from glsk_o3d.resampling import with_support
 
 TORUS = samples.torus(n=600).points
@@ -223,6 +226,26 @@ def test_files_keep_the_sample_of_a_mesh(tmp_path, axis):
         np.testing.assert_array_equal(known.vertex_of_point, axis.vertex_of_point)
         np.testing.assert_array_equal(known.whole.points, axis.whole.points)
         same(Refiner()(known), Refiner()(axis))
+
+
+def test_edits_and_measures_of_a_mesh_keep_to_its_sample(tmp_path):
+    bar = o3d.geometry.TriangleMesh.create_cylinder(0.1, 3, resolution=20, split=1).translate([0, 0, 1.5])
+    stem = glsk.skeletonize(bar, "tree")
+    for edited in (
+        glsk.editing.reroot(stem, "-z"),
+        glsk.editing.simplify(stem, tolerance=0.01),
+        glsk.editing.prune(stem, length=0.1, order=0),
+        glsk.editing.largest_component(stem),
+        glsk.editing.cut_loops(stem)[0],
+    ):
+        assert not edited.lacks_sample
+        assert len(edited.vertex_of_point) == len(bar.vertices)
+        assert edited.whole.vertex_of_point.max() < len(edited.vertices)
+    assert abs(glsk.analysis.tree_measures(stem).stem_diameter - 0.2) < 0.005
+    assert abs(glsk.analysis.cylinders(stem).volume.sum() / (np.pi * 0.1**2 * 3) - 1) < 0.05
+    glsk.save_skeleton(stem, tmp_path / "stem.json")
+    told = CliRunner().invoke(app, ["evaluate", str(tmp_path / "stem.json"), "--json"])
+    assert json.loads(told.stdout)["assessment"]["topology"] == 1
 
 
 def test_a_changed_skeleton_of_a_sampled_mesh_says_what_it_lacks(axis):

@@ -118,7 +118,7 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
     >>> abs(tree_measures(stem).stem_diameter - 0.2) < 0.01  # up is x, as in the pipeline
     True
     """
-    up = upward(skeleton, root, up)
+    up, skeleton = upward(skeleton, root, up), skeleton.whole
     check_number("unit", unit, low=0, open_low=True)
     pieces = cylinders(skeleton, root, up)
     foot, onward = pieces.start_point[0], pieces.end_point[0]

@@ -107,7 +107,7 @@ def cylinders(skeleton: Any, root: Any = None, up: str | None = None) -> Cylinde
         raise InvalidParameterError("the skeleton has no radii: a file of a format without them was read")
     if root is None and not skeleton.report.root:  # numbered outwards, all but the first have one neighbour before them
         root = 0 if np.array_equal(np.sort(skeleton.edges[:, 1]), np.arange(1, len(skeleton.vertices))) else None
-    up = upward(skeleton, root, up)
+    up, skeleton = upward(skeleton, root, up), skeleton.whole
     table, beyond = branch_table(skeleton, root), _beyond_tips(skeleton)
     last = np.full(len(table), -1)
     rows: list[tuple[Any, ...]] = []

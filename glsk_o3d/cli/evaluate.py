@@ -37,7 +37,7 @@ def evaluate(
         update(f"reading {skeleton.name}")
         curve = read_skeleton(skeleton)
         axis = read_truth(truth) if truth is not None else None
-        points = curve.points if cloud is None else read_scan(cloud).by_area().positions
+        points = curve.whole.points if cloud is None else read_scan(cloud).by_area().positions
         if not len(points):
             raise WrongUsage(f"{skeleton}: holds no cloud, as json and npz files of a run do: give the CLOUD, too")
         update("measuring")

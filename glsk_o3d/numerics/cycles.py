@@ -79,7 +79,7 @@ def _horton(chains: list[Chain]) -> list[Chain]:
     graph = csr_matrix((lengths[list(shortest.values())], keys.T), shape=(m, m))
     rank, high = len(chains) - m + component_labels(m, ends).max() + 1, -np.inf
     basis, pivots = list[tuple[float, list[int]]](), dict[int, int]()
-    while len(basis) < rank and high < lengths.sum():  # in a large graph most cycles of a basis are short
+    while len(basis) < rank and high < 2 * lengths.sum():  # in a large graph most cycles of a basis are short
         low, high = high, max(2 * high, 4 * lengths.mean())
         for total, e, before, top in _closed(graph, low, high, ends, lengths, shortest):
             cycle = 1 << e

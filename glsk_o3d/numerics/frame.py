@@ -131,17 +131,17 @@ def to_working_frame(
 def _places(cloud: np.ndarray, distance: np.ndarray, near: np.ndarray) -> np.ndarray:
     """The place of each point, (n,) int array: copies have one; `distance` and `near` (n, k) are to its neighbours.
 
-    Where these may all be copies, it is asked how far points in a square as wide as the middle half of the cloud are
-    apart. But if there are fewer places than copies in each, they are parts of an object, small and far away.
+    Where these may all be copies, it is asked how far points in a square as wide as half of the cloud are apart: one
+    place is what has all its neighbours in it. Of more than there can be places like it, it is an object, far away.
     """
     n, last = len(cloud), distance[:, -1:]
-    middle = np.ptp(np.quantile(cloud, (0.25, 0.75), axis=0), axis=0).max()  # of an outlier it knows nothing
-    for apart in (np.maximum(last, middle / np.sqrt(n)), last):
-        same = distance <= np.maximum(SAME_POINT * apart, ROUNDINGS)
-        place, copy = np.nonzero(same)
+    middle = 2 * np.median(norm(cloud - np.median(cloud, axis=0)))  # of outliers it knows nothing
+    apart = np.maximum(last, middle / np.sqrt(n))
+    for _ in range(2):
+        place, copy = np.nonzero(distance <= np.maximum(SAME_POINT * apart, ROUNDINGS))
         group = component_labels(n, np.column_stack([place, near[place, copy]])[place != near[place, copy]])
-        if group.max() ** 2 > n:
-            break
+        away, count = np.bincount(group, (group[near] != group[:, None]).any(axis=1)), np.bincount(group)
+        apart = np.where(((away > 0) | (count**2 > n))[group, None], last, apart)
     return group
 
 

@@ -164,3 +164,14 @@ def test_edges_without_length():
         assert all(
             graph.has_edge(*step) for c in cycles for step in zip(c.tolist(), np.roll(c, -1).tolist(), strict=True)
         )
+
+
+def test_rounding_loses_no_cycle():
+    """A ring with a loop at each junction is as long as all chains together, added in another order."""
+    for seed in range(300):
+        edges, n = list[tuple[int, int]](), 4
+        for i in range(4):
+            edges += [(i, (i + 1) % 4), (i, n), (n, n + 1), (i, n + 1)]
+            n += 2
+        lengths = np.random.default_rng(seed).random(len(edges))
+        assert len(minimum_cycle_basis(n, np.sort(edges, axis=1), lengths)) == 5

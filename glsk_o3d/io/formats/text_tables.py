@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, TextIO
 
 import numpy as np
 
+from ...numerics.groups import quantile
 from ..scan import NoPoints, Scan, scan_of
 
 _log = logging.getLogger(__name__)
@@ -146,9 +147,12 @@ def _parted(line: str, delimiter: str | None) -> tuple[list[str], list[int]]:
 def _has_decimal_commas(names: list[str], lines: list[str]) -> bool:
     """Whether commas that part words are decimal points, too: more words than names, or zeros ahead of a number."""
     rows = [_parted(line.strip().rstrip(","), ",")[0] for line in lines if "." not in line]
-    if names and len(rows) == len(lines):
-        return len(rows[0]) > len(names)
-    return not names and any(re.fullmatch(r"0\d+", word) for words in rows for word in words[1:4:2])
+    if names:
+        sizes = [len(words) - len(names) for words in rows] if len(rows) == len(lines) else [0]
+        more = quantile(np.array(sizes))  # a whole place among them has no commas
+        return more >= 3 or (more > 0 and min(sizes) < max(sizes))
+    padded = [[re.fullmatch(r"0\d+", word) for word in words[:4]] for words in rows if len(words) > 3]
+    return any(x[1] or x[3] for x in padded) and not any(x[0] or x[2] for x in padded)
 
 
 def _number(word: str, delimiter: str | None) -> float | None:

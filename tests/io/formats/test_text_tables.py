@@ -91,6 +91,7 @@ def test_attributes_become_those_of_a_tensor_cloud(tmp_path):
             "commas between columns and in numbers are not understood: part columns by semicolons",
         ),
         ("x,y,z,label\n1,64,1,27,1,04,7\n", "commas between columns and in numbers are not understood"),
+        ("x,y,z\n0,0,0\n" + 9 * "1,25,0,33,1,5\n", "commas between columns and in numbers are not understood"),
         ("1,64,1,27,1,40\n1,64,-1,07,1,04\n", "commas between columns and in numbers are not understood"),
         (2 * '"1,5","2,5","3,5"\n', "2 of 2 lines hold no point; commas between columns and in numbers"),
         ("ncols 4\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3 4\n", "it is a grid of heights"),
@@ -104,7 +105,16 @@ def test_text_that_is_no_cloud(tmp_path, text, why):
         read_cloud(tmp_path / "c.csv")
 
 
-@pytest.mark.parametrize("text", ["x,y,z,\n1,2,3,\n4,5,6,\n", "x,y,z\n1.5,2,3,7\n4.5,5,6,7\n", "1,2,3,0,10,007\n" * 2])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "x,y,z,\n1,2,3,\n4,5,6,\n",
+        "x,y,z\n1.5,2,3,7\n4.5,5,6,7\n",
+        "1,2,3,0,10,007\n" * 2,
+        "1,2,3\n01,02,03\n",
+        "# x,y,z\n1,2,3,4\n4,5,6,7\n",
+    ],
+)
 def test_commas_that_part_columns_alone(tmp_path, text):
     (tmp_path / "c.csv").write_text(text)
     np.testing.assert_array_equal(np.floor(read_scan(tmp_path / "c.csv").positions[0]), [1, 2, 3])
