@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
 from itertools import pairwise
 
@@ -81,13 +82,25 @@ def _asked(refiner: Refiner, raw: Skeleton, truth: Truth) -> Iterator[tuple[str,
 
 
 def _limbs(skeleton: Skeleton, evidence: Evidence, truth: Truth) -> Iterator[tuple[str, dict[str, float], bool]]:
-    """A branch is a limb if a true tip is lost without it: of two prongs in one end either may go, and is none."""
+    """A branch is a limb if a true tip is lost without it.
+
+    Of two prongs in one end either may go. That which stands out more is not asked about: once the other is pruned, it
+    is how the limb goes on.
+    """
     leaves = np.flatnonzero(skeleton.degree == 1)
     tips = np.flatnonzero(np.bincount(truth.edges.ravel(), minlength=len(truth.nodes)) == 1)
     near = cdist(skeleton.vertices[leaves], truth.nodes[tips]) <= TIP_REACH * truth.radii[tips]
     served = _served(near)
-    for leaf, facts in limb_facts(skeleton, evidence):
-        yield "limb", facts, _served(near[leaves != leaf]) < served
+    asked = {leaf: (facts, _served(near[leaves != leaf]) < served) for leaf, facts in limb_facts(skeleton, evidence)}
+    at = defaultdict[int, list[int]](list)
+    for branch in skeleton.branches:
+        for junction, leaf in (branch[[0, -1]], branch[[-1, 0]]):
+            if leaf in asked and skeleton.degree[junction] == 3:
+                at[junction].append(leaf)
+    for prongs in at.values():
+        if len(prongs) == 2 and not any(asked[leaf][1] for leaf in prongs):
+            del asked[max(prongs, key=lambda leaf: asked[leaf][0]["protrusion"])]
+    yield from (("limb", facts, is_so) for facts, is_so in asked.values())
 
 
 def _served(near: np.ndarray) -> int:

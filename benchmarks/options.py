@@ -39,7 +39,7 @@ ANIMALS = [name for name in CLOUDS if name.startswith("animal") and "1024" not i
 SPURS = {
     "0": "Refiner.limb=0",
     f"{Refiner().limb}, the default": "",
-    "0.7": "Refiner.limb=0.7",
+    "0.8": "Refiner.limb=0.8",
     "0.95": "Refiner.limb=0.95",
     "the default, with `RingBuilder.k=24`": "RingBuilder.k=24",
 }

@@ -45,7 +45,7 @@ QUESTIONS = {
         "spur pruned",
         "limb",
         False,
-        dict(constant=-5.7, protrusion=5.2, certainty=1.3, roundness=2.2),
+        dict(constant=-3.5, protrusion=3.4, certainty=2.1, slenderness=0.9),
     ),
     "air": Question(
         "the branch at ({}) crosses air",

@@ -85,7 +85,7 @@ class Refiner(Filter[Skeleton]):
         0.5, "Least probability that the object continues across a gap for a bridge. 0 bridges none.", low=0, high=1
     )
     limb: float = parameter(
-        0.25, "Least probability that a branch is a limb; others, spurs, are pruned. 0 keeps all.", low=0, high=1
+        0.5, "Least probability that a branch is a limb; others, spurs, are pruned. 0 keeps all.", low=0, high=1
     )
     set_aside: bool = parameter(
         True,

@@ -63,5 +63,10 @@ def test_which_comments_count(source, origin):
 def test_no_more_numbers_steer_a_skeleton():
     numbers = steering.steering()
     assert len(numbers) <= MOST_STEERING
-    assert {each.name for each in numbers} >= {"amplification", "limb: roundness", "LINE_VARIANCE", "CLEAN_SPHERICITY"}
+    assert {each.name for each in numbers} >= {
+        "amplification",
+        "limb: slenderness",
+        "LINE_VARIANCE",
+        "CLEAN_SPHERICITY",
+    }
     assert all(each.what for each in numbers)

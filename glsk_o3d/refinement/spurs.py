@@ -1,6 +1,5 @@
 """Tell limbs from branches that hardly leave the parts they grow from, and cut these."""
 
-from collections import defaultdict
 from collections.abc import Iterator
 from functools import partial
 from typing import NamedTuple
@@ -23,6 +22,7 @@ SPUR_QUANTILE = 0.9  # fitted: share of a spur's points that its reach covers
 LEAST_OUT = 0.3  # fitted: half widths below which a protrusion says no more
 LONG_OUTSIDE = 4.0  # derived: half widths of a part that is twice as long as it is wide
 NOT_BESIDE = 2.0  # fitted: half widths from a curve to where nothing is beside it, nor the cap of its end
+LEAST_THICKNESS, MOST_THICKNESS = 0.2, 2.0  # derived: of radii, beyond which a branch is no more or less of a limb
 OUTER_PLACES = np.linspace(1 / 3, 1, 5)  # measured: of the length; each but the first and last is asked
 ACROSS = 16  # precision: directions across a branch; eight are enough for flat parts
 
@@ -42,7 +42,7 @@ def prune_spurs(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
     decisions: list[Decision] = []
     given, known = skeleton, dict[bytes, dict[str, float]]()
     while True:
-        found = _with_forks(skeleton, _twigs(skeleton, evidence, known))
+        found = _twigs(skeleton, evidence, known)
         worst: dict[int, _Twig] = {}
         for twig in found:
             before = worst.get(twig.junction)
@@ -69,7 +69,7 @@ def limb_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[int, di
     The facts are: how far its points (all but a tenth, and of a long limb those outside of its body) stand out of the
     surface around the other limbs, over its own half width, as a logarithm, of which, if positive, the share is left
     out that has the object beside it; how certain it is, minus the logarithm of what its mean confidence lacks of 1;
-    and how round the part is at the junction.
+    and how slender, minus the logarithm of its radius over the distance of the surface from the junction.
     """
     return ((twig.tip, twig.facts) for twig in _twigs(skeleton, evidence, {}))
 
@@ -81,11 +81,10 @@ class _Twig(NamedTuple):
     body: np.ndarray  # its other vertices
     tip: int
     facts: dict[str, float]
-    other: float = 1.0  # probability that the other prong is a limb
 
     @property
     def probability(self) -> float:
-        return self.other * QUESTIONS["limb"].probability(self.facts)
+        return QUESTIONS["limb"].probability(self.facts)
 
 
 def _twigs(skeleton: Skeleton, evidence: Evidence, known: dict[bytes, dict[str, float]]) -> list[_Twig]:
@@ -107,8 +106,7 @@ def _facts(
     """What speaks for some branches, given by their numbers and as paths from their junctions."""
     degree, cloud, sections = skeleton.degree, VertexPoints(skeleton), measure_sections(skeleton)
     count, wide = cloud.mass, sections.half_width
-    roundness = np.nan_to_num(sections.half_thickness / np.maximum(wide, TINY))
-    confidence = np.nan_to_num(skeleton.confidence)
+    radius, confidence = sections.radius, np.nan_to_num(skeleton.confidence)
     ending = np.zeros(len(degree), bool)
     for branch in limbs.branches:
         if 1 in degree[branch[[0, -1]]]:
@@ -123,11 +121,13 @@ def _facts(
         # by how far they are, and not as they come, which depends on how the object is turned
         points = own[np.argsort(norm(own - skeleton.vertices[junction]))][:: len(own) // SPUR_POINTS + 1]
         out = max(_standing_out(limbs, k, junction, points, ending), 0.0) if own_half > 0 else 0.0
+        thickness = np.average(radius[part], weights=count[part]) / max(surface[junction], TINY)
+        ratio = np.clip(thickness, LEAST_THICKNESS, MOST_THICKNESS)
         protrusion = float(np.log(out / max(own_half, TINY) + LEAST_OUT))
         yield dict(
             protrusion=protrusion - float(shared) * max(protrusion, 0),
             certainty=-float(np.log1p(-np.average(confidence[body], weights=count[body]))),
-            roundness=float(roundness[junction]),
+            slenderness=-float(np.log(ratio)),
         )
 
 
@@ -140,24 +140,6 @@ def _outside(vertices: np.ndarray, path: np.ndarray, surface: float, wide: np.nd
     away = norm(vertices[body] - vertices[path[0]])
     part = body[np.flatnonzero(away <= surface).max(initial=-1) + 1 :]
     return part if len(part) and away[-1] - surface > LONG_OUTSIDE * quantile(wide[part]) else body
-
-
-def _with_forks(skeleton: Skeleton, twigs: list[_Twig]) -> list[_Twig]:
-    """Twigs, the less probable prong of every fork with the probability that both are limbs.
-
-    A flat end draws two prongs of the curve into its corners, and each stands out of the other: where three branches
-    meet, one of two with ends is a limb only if the other is one, too.
-    """
-    at: defaultdict[int, list[int]] = defaultdict(list)
-    for number, twig in enumerate(twigs):
-        if skeleton.degree[twig.junction] == 3:
-            at[twig.junction].append(number)
-    found = list(twigs)
-    for numbers in at.values():
-        less, *others = sorted(numbers, key=lambda number: twigs[number].probability)
-        if others:
-            found[less] = twigs[less]._replace(other=twigs[others[0]].probability)
-    return found
 
 
 def _beside(
