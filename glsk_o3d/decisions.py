@@ -45,7 +45,7 @@ QUESTIONS = {
         "spur pruned",
         "limb",
         False,
-        dict(constant=-3.5, protrusion=3.4, certainty=2.1, slenderness=0.9),
+        dict(constant=-3.0, protrusion=3.2, certainty=1.8, slenderness=1.0),
     ),
     "air": Question(
         "the branch at ({}) crosses air",
@@ -84,6 +84,11 @@ class Decision:
         That it is so.
     changed : bool
         Whether the graph was changed: the branch cut there, the loop closed, the gap bridged, the branch pruned.
+    branch : tuple of (x, y, z)
+        Of a pruned branch the places of its vertices, from the junction that it left to its tip; see
+        `glsk_o3d.editing.detailed`.
+    radii : tuple of float
+        At these places.
 
     Examples
     --------
@@ -99,6 +104,8 @@ class Decision:
     place: Place
     probability: float
     changed: bool
+    branch: tuple[Place, ...] = ()
+    radii: tuple[float, ...] = ()
 
     @property
     def is_uncertain(self) -> bool:

@@ -1,4 +1,4 @@
-"""Functions that prune, simplify and reroot a skeleton. Each returns a new one."""
+"""Functions that prune, simplify and reroot a skeleton, and turn its detail. Each returns a new one."""
 
 from collections import Counter
 from dataclasses import replace
@@ -12,11 +12,12 @@ from .numerics.near_links import linked
 from .numerics.polylines import arc_lengths
 from .numerics.vectors import TINY, norm
 from .parameters import check_number
+from .refinement.detail import restored, without_limbs
 from .refinement.merging import merge_into, some_vertices
 from .refinement.rooted import RootPlace, numbered_from, root_among
 from .skeleton import Skeleton, of_input
 
-__all__ = ["cut_loops", "largest_component", "prune", "reroot", "simplify"]
+__all__ = ["cut_loops", "detailed", "largest_component", "prune", "reroot", "simplify"]
 
 
 def largest_component(skeleton: Skeleton) -> Skeleton:
@@ -81,6 +82,41 @@ def cut_loops(skeleton: Skeleton) -> tuple[Skeleton, np.ndarray]:
     stays = np.isin(skeleton.edges @ [m, 1], left @ [m, 1])
     cut = of_input(replace(skeleton.whole, edges=skeleton.edges[stays]))
     return cut, skeleton.vertices[skeleton.edges[~stays]]
+
+
+def detailed(skeleton: Skeleton, *, limb: float) -> Skeleton:
+    """Turn the detail up or down: limbs from another probability on than `Refiner.limb`, without a new run.
+
+    Pruned branches come back as they were when they were pruned, and their ends are not led on to the surface. What
+    goes can come back, too.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Of a Refiner with a `limb` above 0, or from a .json or .npz file of such a one. Others stay as they are.
+    limb : float
+        Least probability that a branch with an end is a limb, from 0 to 1. 0 shows every branch that was found.
+
+    Returns
+    -------
+    Skeleton
+        `report.decisions` says what is there now.
+
+    Raises
+    ------
+    InvalidParameterError
+        The probability is out of range.
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import sauropod
+    >>> animal = skeletonize(sauropod(2000).points)
+    >>> len(animal.leaves), len(detailed(animal, limb=0.0).leaves)
+    (6, 7)
+    """
+    check_number("limb", limb, low=0, high=1)
+    return of_input(without_limbs(restored(skeleton.whole, limb), limb))
 
 
 def reroot(skeleton: Skeleton, root: RootPlace = "z") -> Skeleton:

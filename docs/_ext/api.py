@@ -69,6 +69,7 @@ NAMES = {
     "editing": {
         "Leave out": ("prune", "largest_component", "cut_loops"),
         "Fewer vertices": ("simplify",),
+        "More or less detail": ("detailed",),
         "Another root": ("reroot",),
     },
     "batch": {

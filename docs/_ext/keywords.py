@@ -12,7 +12,7 @@ KEYWORDS = {
     "docs/open3d": "open3d, annotate, attributes, colours, colors, tubes, tensor, downsample, point reduction",
     "docs/branches": "branch, branches, segmentation, segment, label, labels, length",
     "docs/trees": "tree, trees, plant, plants, forestry, forest, qsm, treeqsm, cylinders, volume, dbh, stem, crown",
-    "docs/editing": "edit, editing, prune, simplify, reroot, cut loops, rig, armature, convert",
+    "docs/editing": "edit, editing, detail, prune, simplify, reroot, cut loops, rig, armature, convert",
     "docs/depth_camera": "depth camera, depth image, rgb-d, rgbd, realsense, kinect, flying pixels, mixed pixels, veil",
     "docs/grasping": "grasp, grasps, grasping, gripper, manipulation, pick, picking",
     "docs/robots": "robot, robots, ros, ros2, ros 2, urdf, bag, rosbag, node",

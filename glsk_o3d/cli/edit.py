@@ -13,6 +13,9 @@ from .outputs import Output, check_outputs, skeleton_outputs, tell, write_each
 def edit(
     skeleton: SkeletonFile,
     output: SkeletonOutput = None,
+    limb: Annotated[
+        float | None, option("P", "Show limbs from this probability on, 0 for all that were found.", min=0, max=1)
+    ] = None,
     largest: Annotated[bool, Option("--largest", help="Keep the longest connected component alone.")] = False,
     cut_loops: Annotated[bool, Option("--cut-loops", help="Drop an edge of every loop.")] = False,
     root: Annotated[Any, root_option("Number vertices from a root outwards, and count orders from there")] = None,
@@ -35,6 +38,8 @@ def edit(
     outputs = skeleton_outputs(output)
     check_outputs(outputs, skeleton, needed="an output with -o")
     before = edited = read_skeleton(skeleton)
+    if limb is not None:
+        edited = editing.detailed(edited, limb=limb)
     if largest:
         edited = editing.largest_component(edited)
     if cut_loops:

@@ -22,7 +22,7 @@ SPUR_QUANTILE = 0.9  # fitted: share of a spur's points that its reach covers
 LEAST_OUT = 0.3  # fitted: half widths below which a protrusion says no more
 LONG_OUTSIDE = 4.0  # derived: half widths of a part that is twice as long as it is wide
 NOT_BESIDE = 2.0  # fitted: half widths from a curve to where nothing is beside it, nor the cap of its end
-LEAST_THICKNESS, MOST_THICKNESS = 0.2, 2.0  # derived: of radii, beyond which a branch is no more or less of a limb
+SLENDEREST, STOUTEST = 0.2, 2.0  # derived: of radii, beyond which a branch is no more or less of a limb
 OUTER_PLACES = np.linspace(1 / 3, 1, 5)  # measured: of the length; each but the first and last is asked
 ACROSS = 16  # precision: directions across a branch; eight are enough for flat parts
 
@@ -48,19 +48,24 @@ def prune_spurs(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
             before = worst.get(twig.junction)
             if twig.probability < (before.probability if before else least):
                 worst[twig.junction] = twig
-        decisions += [
-            Decision("limb", tuple(skeleton.vertices[twig.tip].tolist()), twig.probability, bool(worst))
-            for twig in worst.values() or found
-        ]
         if not worst:
+            decisions += [limb_decision(skeleton, twig.probability, np.array([twig.tip]), False) for twig in found]
             return with_fields(skeleton, normals=given.normals), decisions
         group = np.arange(len(skeleton.vertices))
         for twig in worst.values():
             group[twig.body] = twig.junction
+            decisions.append(limb_decision(skeleton, twig.probability, np.r_[twig.junction, twig.body], True))
         # points of a cut branch are farther from its junction than the surface there is: they have no say any more
         gone = np.isin(skeleton.vertex_of_point, np.concatenate([twig.body for twig in worst.values()]))
         normals = np.where(gone[:, None], np.nan, skeleton.normals)
         skeleton = merge_into(with_fields(skeleton, normals=normals), group)
+
+
+def limb_decision(skeleton: Skeleton, probability: float, path: np.ndarray, pruned: bool) -> Decision:
+    """The decision about a branch, a path of vertices from its junction to its tip; of a pruned one with its curve."""
+    places = [tuple(place) for place in skeleton.vertices[path].tolist()]
+    curve = dict(branch=tuple(places), radii=tuple(skeleton.radii[path].tolist())) if pruned else {}
+    return Decision("limb", places[-1], probability, pruned, **curve)
 
 
 def limb_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[int, dict[str, float]]]:
@@ -122,7 +127,7 @@ def _facts(
         points = own[np.argsort(norm(own - skeleton.vertices[junction]))][:: len(own) // SPUR_POINTS + 1]
         out = max(_standing_out(limbs, k, junction, points, ending), 0.0) if own_half > 0 else 0.0
         thickness = np.average(radius[part], weights=count[part]) / max(surface[junction], TINY)
-        ratio = np.clip(thickness, LEAST_THICKNESS, MOST_THICKNESS)
+        ratio = np.clip(thickness, SLENDEREST, STOUTEST)
         protrusion = float(np.log(out / max(own_half, TINY) + LEAST_OUT))
         yield dict(
             protrusion=protrusion - float(shared) * max(protrusion, 0),

@@ -6,10 +6,11 @@ import numpy as np
 import open3d as o3d
 import pytest
 
-from glsk_o3d import Skeleton, read_skeleton, save_rig, save_skeleton
+from glsk_o3d import Skeleton, read_skeleton, save_rig, save_skeleton, skeletonize
 from glsk_o3d.cli.options import SKELETON_ENDINGS, TREE_ENDINGS
 from glsk_o3d.io.scans import read_mesh
 from glsk_o3d.io.skeletons import FORMATS
+from glsk_o3d.samples import sauropod
 
 
 @pytest.fixture
@@ -39,6 +40,15 @@ def test_edits_one_after_the_other(invoke, file, tmp_path):
     assert invoke("edit", file, "-o", "same.ply").stdout == "all counts are as before\nwrote same.ply\n"
     assert invoke("edit", file, "-o", "new.ply", "--simplify", 10, "-q").output == ""
     assert read_skeleton(tmp_path / "new.ply").n_loops == 1
+
+
+def test_detail_is_turned(invoke, tmp_path):
+    save_skeleton(skeletonize(sauropod(2000).points), tmp_path / "animal.json")
+    result = invoke("edit", "animal.json", "-o", "less.json", "--limb", 1)
+    assert "leaves 6 -> 0" in result.stdout
+    assert len(read_skeleton(tmp_path / "less.json").leaves) == 0
+    assert "leaves 0 -> 6" in invoke("edit", "less.json", "-o", "more.json", "--limb", 0.5).stdout
+    assert "less than or equal to 1" in invoke("edit", "less.json", "-o", "more.json", "--limb", 1.5).output
 
 
 def test_convert(invoke, file, tmp_path):

@@ -65,6 +65,29 @@ def test_layers_and_colours(report, look, pixels):
     assert page.locator("#legend").is_visible()
 
 
+def test_a_slider_shows_pruned_limbs_and_hides_others(run, look, pixels, tmp_path):
+    tips = run.vertices[run.leaves[:2]]
+    there = glsk.Decision("limb", tuple(tips[0].tolist()), 0.8, changed=False)
+    aside = tips[1] + np.ptp(run.points, axis=0).max() / 5 * np.arange(3)[:, None] * [0, 0, 1]
+    gone = glsk.Decision("limb", tuple(aside[-1].tolist()), 0.2, True, tuple(map(tuple, aside.tolist())), (0.01,) * 3)
+    judged = dataclasses.replace(run, report=dataclasses.replace(run.report, decisions=(there, gone)))
+    glsk.save_report(judged, tmp_path / "judged.html")
+    page = look(tmp_path / "judged.html")
+    page.uncheck("#cloud")
+    shown = {}
+    for value in (None, 0.1, 0.5, 0.9):
+        if value is not None:
+            page.locator("#limb").evaluate(
+                "(slider, value) => { slider.value = value; slider.dispatchEvent(new Event('input')) }", value
+            )
+        shown[value] = drawn(pixels(page))
+    np.testing.assert_array_equal(shown[None], shown[0.5])
+    assert shown[0.1].sum() > shown[0.5].sum() > shown[0.9].sum() > 0
+    plain = dataclasses.replace(run, report=dataclasses.replace(run.report, decisions=()))
+    glsk.save_report(plain, tmp_path / "plain.html")
+    assert look(tmp_path / "plain.html").locator("#limb").is_hidden()
+
+
 def test_turns_zooms_and_comes_back(report, look, pixels):
     page = look(report)
     box = page.locator("#view").bounding_box()

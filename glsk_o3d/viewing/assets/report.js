@@ -20,7 +20,10 @@
   const branchOfVertex = new Int32Array(bytes(data.branch_of_vertex));
   const branchOfEdge = new Int32Array(bytes(data.branch_of_edge));
   const measures = { radius: radii, confidence: new Float32Array(bytes(data.confidence)) };
-  const nPoints = vertexOfPoint.length, nPieces = edges.length / 2;
+  const pruned = new Float32Array(bytes(data.pruned)); // both ends of pieces: place and radius
+  const chance = new Float32Array(bytes(data.chance)); // that it is of a limb, of each edge and then of each of these
+  const nPoints = vertexOfPoint.length, nPieces = chance.length;
+  const order = Array.from(chance.keys()).sort((a, b) => chance[b] - chance[a]); // so that the first ones are shown
   const GREY = [136, 142, 148];
 
   // ------------------------------------------------------------------------------------------------- programs
@@ -113,11 +116,13 @@
       if (ring) triangles.push(a - AROUND, b - AROUND, a, a, b - AROUND, b);
     }
   });
-  const ends = new Float32Array(nPieces * 8);
+  const given = new Float32Array(nPieces * 8), ends = new Float32Array(nPieces * 8);
   edges.forEach((vertex, i) => {
-    ends.set(vertices.subarray(3 * vertex, 3 * vertex + 3), 4 * i);
-    ends[4 * i + 3] = radii[vertex];
+    given.set(vertices.subarray(3 * vertex, 3 * vertex + 3), 4 * i);
+    given[4 * i + 3] = radii[vertex];
   });
+  given.set(pruned, 4 * edges.length);
+  order.forEach((piece, i) => ends.set(given.subarray(8 * piece, 8 * piece + 8), 8 * i));
   const pointColours = gl.createBuffer(), pieceColours = gl.createBuffer(), places = filled(positions);
 
   const cloudShape = gl.createVertexArray();
@@ -147,10 +152,11 @@
   };
   const paint = () => {
     const mode = element("colour").value, range = data.ranges[mode], values = measures[mode];
-    const cloud = new Uint8Array(3 * nPoints), skeleton = new Uint8Array(3 * edges.length);
+    const cloud = new Uint8Array(3 * nPoints), skeleton = new Uint8Array(6 * nPieces);
     const colour = (branch, v) => (mode === "branch" ? ofBranch(branch) : ofMeasure(values[v], range));
     vertexOfPoint.forEach((v, i) => cloud.set(blend(colour(branchOfPoint[i], v), GREY, 0.5), 3 * i));
-    edges.forEach((v, i) => skeleton.set(colour(branchOfEdge[i >> 1], v), 3 * i));
+    order.forEach((piece, i) => [0, 1].forEach((end) => skeleton.set(
+      piece < branchOfEdge.length ? colour(branchOfEdge[piece], edges[2 * piece + end]) : GREY, 6 * i + 3 * end)));
     for (const [buffer, array] of [[pointColours, cloud], [pieceColours, skeleton]]) {
       gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
       gl.bufferData(gl.ARRAY_BUFFER, array, gl.STATIC_DRAW);
@@ -214,7 +220,8 @@
     gl.uniform1f(pieces.uniform("thin"), thin);
     gl.uniform4fv(pieces.uniform("plain"), plain);
     gl.uniform1f(pieces.uniform("opacity"), opacity);
-    gl.drawElementsInstanced(gl.TRIANGLES, triangles.length, gl.UNSIGNED_SHORT, 0, nPieces);
+    const shown = chance.reduce((count, value) => count + (value >= element("limb").value), 0);
+    gl.drawElementsInstanced(gl.TRIANGLES, triangles.length, gl.UNSIGNED_SHORT, 0, shown);
   };
   const use = ({ made, uniform }) => {
     gl.useProgram(made);
@@ -273,6 +280,12 @@
   element("cloud").parentNode.hidden = !nPoints;
   for (const name of ["skeleton", "colour"]) element(name).parentNode.hidden = !nPieces;
   element("tubes").parentNode.hidden = !("radius" in data.ranges && nPieces);
+  element("limb").value = data.limb;
+  element("limb").parentNode.hidden = !chance.some((value) => value < 1);
+  element("limb").addEventListener("input", () => {
+    element("limb").nextElementSibling.textContent = (+element("limb").value).toFixed(2);
+    redraw();
+  });
   document.querySelectorAll("[data-view]").forEach((button) =>
     button.addEventListener("click", () => look(button.dataset.view)));
   element("save").addEventListener("click", () => {
