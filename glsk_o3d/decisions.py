@@ -7,6 +7,8 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from .numerics.vectors import FARTHEST_PLACE
+
 Place: TypeAlias = tuple[float, float, float]
 
 
@@ -111,6 +113,17 @@ class Decision:
     def is_uncertain(self) -> bool:
         """Whether the probability lies between a quarter and three quarters."""
         return 0.25 <= self.probability <= 0.75
+
+    @property
+    def is_possible(self) -> bool:
+        """Whether the probability lies between 0 and 1, places are near enough, and each of a branch has a radius."""
+        places, radii = np.array([self.place, *self.branch]), np.array(self.radii)
+        return bool(
+            0 <= self.probability <= 1
+            and (np.abs(places) <= FARTHEST_PLACE).all()
+            and len(self.branch) == len(radii) != 1
+            and not ((radii < 0) | np.isinf(radii)).any()
+        )
 
     @property
     def outcome(self) -> str:

@@ -12,7 +12,7 @@ from .numerics.near_links import linked
 from .numerics.polylines import arc_lengths
 from .numerics.vectors import TINY, norm
 from .parameters import check_number
-from .refinement.detail import restored, without_limbs
+from .refinement.detail import with_limbs
 from .refinement.merging import merge_into, some_vertices
 from .refinement.rooted import RootPlace, numbered_from, root_among
 from .skeleton import Skeleton, of_input
@@ -87,15 +87,16 @@ def cut_loops(skeleton: Skeleton) -> tuple[Skeleton, np.ndarray]:
 def detailed(skeleton: Skeleton, *, limb: float) -> Skeleton:
     """Turn the detail up or down: limbs from another probability on than `Refiner.limb`, without a new run.
 
-    Pruned branches come back as they were when they were pruned, and their ends are not led on to the surface. What
-    goes can come back, too.
+    The least probable branch goes first. Pruned branches come back as they were when they were pruned, to the nearest
+    vertex. What goes can come back, too. The root of a tree stays.
 
     Parameters
     ----------
     skeleton : Skeleton
-        Of a Refiner with a `limb` above 0, or from a .json or .npz file of such a one. Others stay as they are.
+        Of a Refiner with a `limb` above 0, or from a .json or .npz file of such a one. Others, without decisions about
+        limbs in their report, stay as they are.
     limb : float
-        Least probability that a branch with an end is a limb, from 0 to 1. 0 shows every branch that was found.
+        Least probability that a branch with an end is a limb, from 0 to 1.
 
     Returns
     -------
@@ -116,7 +117,7 @@ def detailed(skeleton: Skeleton, *, limb: float) -> Skeleton:
     (6, 7)
     """
     check_number("limb", limb, low=0, high=1)
-    return of_input(without_limbs(restored(skeleton.whole, limb), limb))
+    return of_input(with_limbs(skeleton.whole, limb))
 
 
 def reroot(skeleton: Skeleton, root: RootPlace = "z") -> Skeleton:

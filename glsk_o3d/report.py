@@ -249,6 +249,8 @@ class Report:
         report: Report = _read(data, cls)
         if not all(decision.about in QUESTIONS for decision in report.decisions):
             raise ValueError("a decision in its report is about an unknown question")
+        if not all(decision.is_possible for decision in report.decisions):
+            raise ValueError("a decision in its report has a probability, a place or a branch that cannot be")
         if len(report.root) not in (0, 3):
             raise ValueError("the root in its report is no place")
         if not isinstance(report.recipe.get("pipeline", []), list):

@@ -14,7 +14,7 @@ from .interop.packages import import_open3d, require
 from .numerics.groups import component_labels
 from .numerics.paths import maximal_paths
 from .numerics.radii import supporting_points
-from .numerics.vectors import norm
+from .numerics.vectors import FARTHEST_PLACE, norm
 from .parameters import shown
 from .report import Report
 
@@ -39,7 +39,6 @@ ARRAYS: dict[str, tuple[tuple[int, ...], type]] = {
 """The arrays of a skeleton: the shape of a row and the type of each. The one field more is ``report``."""
 NOT_MEASURED: dict[str, Any] = dict.fromkeys(OF_VERTICES[1:])
 """For `replace`, where vertices are others than before."""
-FARTHEST_PLACE = 1e150  # derived: a float64 holds the squares of lengths up to it, and their sums
 UNIT = 1.001  # derived: a unit vector that was written in three digits is one
 
 

@@ -39,6 +39,8 @@ def edit(
     check_outputs(outputs, skeleton, needed="an output with -o")
     before = edited = read_skeleton(skeleton)
     if limb is not None:
+        if not any(it.about == "limb" for it in before.report.decisions):
+            echo("no limb was judged: --limb needs the .json or .npz of a run with Refiner.limb above 0", err=True)
         edited = editing.detailed(edited, limb=limb)
     if largest:
         edited = editing.largest_component(edited)

@@ -5,6 +5,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 TINY = np.finfo(float).tiny  # derived: what a divisor is at least
+FARTHEST_PLACE = 1e150  # derived: a float64 holds the squares of lengths up to it, and their sums
 PAIRS = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]  # derived: the entries of a symmetric 3 x 3 matrix
 ROWS, COLUMNS = np.array(PAIRS).T
 FULL = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])  # derived: the place of every entry of it among these six

@@ -1,107 +1,157 @@
-"""Take limbs out and in again by their probability, after a Refiner has judged them."""
+"""Turn the detail of a skeleton up and down: limbs by their probability, after a Refiner has judged them."""
 
+import heapq
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import takewhile
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..decisions import Decision
+from ..numerics.pairing import final_representatives
+from ..numerics.paths import maximal_paths
+from ..numerics.polylines import arc_lengths
 from ..numerics.vectors import norm
 from ..skeleton import OF_VERTICES, Skeleton
-from .merging import merge_into
 from .spurs import limb_decision
 
-END_MOVES = 3.0  # derived: radii within which an end stays that grows anew, and the junction that a branch has left
+END_MOVES = 3.0  # derived: radii, or all of a short branch, that its end may move while the curve is refined
+NEAREST_TIPS = 8  # speed: of which a decision may be about one
 
 
-def judged_branches(skeleton: Skeleton) -> dict[int, Decision]:
-    """The decision nearest to its end, by number, for each branch between a junction and an end that is a limb."""
-    kept = [it for it in skeleton.report.decisions if it.about == "limb" and not it.changed]
-    ends = np.array([branch[[0, -1]] for branch in skeleton.branches], int).reshape(-1, 2)
-    degree = skeleton.degree[ends]
-    numbers = np.flatnonzero((degree.min(axis=1) == 1) & (degree.max(axis=1) > 2))
-    if not kept or not len(numbers):
-        return {}
-    tips = ends[numbers, degree[numbers].argmin(axis=1)]
-    distance, nearest = cKDTree(skeleton.vertices[tips]).query([it.place for it in kept])
-    found: dict[int, Decision] = {}
-    for k in np.argsort(-distance, kind="stable").tolist():  # so that the nearest is the last
-        if distance[k] <= END_MOVES * skeleton.radii[tips[nearest[k]]]:
-            found[int(numbers[nearest[k]])] = kept[k]
-    return found
+class Limbs(NamedTuple):
+    """A skeleton with all branches that were pruned, and the decisions about its limbs."""
+
+    vertices: np.ndarray  # (n, 3) those of the skeleton, and then those of pruned branches
+    radii: np.ndarray  # (n,)
+    edges: np.ndarray  # (e, 2) in the same order
+    judged: dict[int, Decision]  # by the vertex at the end
 
 
-def grafts(skeleton: Skeleton, least: float) -> Iterator[tuple[Decision, np.ndarray]]:
-    """Pruned branches that are limbs with a probability of at least `least`, and where they belong.
+def all_limbs(skeleton: Skeleton) -> Limbs:
+    """A skeleton with its pruned branches, each joined to the vertex nearest to the junction that it left, but no end.
 
-    A branch is the path from the vertex nearest to the junction that it left, (k,) int array: its own vertices have the
-    numbers after those of the skeleton and of the branches before it. The last one to be pruned is the first, since
-    others may have left it.
+    The last one to be pruned is the first to come back, since others may have left it. Those that left a place where
+    nothing is any more are left out.
     """
-    vertices, radii = skeleton.vertices, skeleton.radii
+    vertices, radii, edges, judged = skeleton.vertices, skeleton.radii, [skeleton.edges], _judged_ends(skeleton)
+    inner = skeleton.degree > 1
     for limb in reversed(skeleton.report.decisions):
-        if limb.about != "limb" or not limb.branch or limb.probability < least:
+        if limb.about != "limb" or not limb.changed or not limb.branch or not inner.any():
             continue
         places = np.array(limb.branch)
-        away = norm(vertices - places[0])
+        away = np.where(inner, norm(vertices - places[0]), np.inf)
         junction = int(away.argmin())
         if away[junction] <= END_MOVES * max(limb.radii[0], radii[junction]):
-            yield limb, np.r_[junction, len(vertices) + np.arange(len(places) - 1)]
+            path = np.r_[junction, len(vertices) + np.arange(len(places) - 1)]
+            edges.append(np.column_stack([path[:-1], path[1:]]))
             vertices, radii = np.concatenate([vertices, places[1:]]), np.r_[radii, limb.radii[1:]]
+            inner = np.r_[inner, np.arange(len(places) - 1) < len(places) - 2]
+            judged[int(path[-1])] = limb
+    return Limbs(vertices, radii, np.concatenate(edges), judged)
 
 
-def restored(skeleton: Skeleton, least: float) -> Skeleton:
-    """A skeleton with those pruned branches that are limbs with a probability of at least `least`.
+def pruning_order(limbs: Limbs) -> Iterator[tuple[Decision, list[int]]]:
+    """The branches that leave a junction and end, as paths from there, in the order in which they go.
 
-    Points nearer to their vertices than to the vertex that they have belong to them.
+    The least probable limb goes first. Where two branches are left at a junction they are one from then on.
     """
-    limbs, paths = [], []
-    for limb, path in grafts(skeleton, least):
-        limbs.append(limb)
-        paths.append(path)
-    if not limbs:
+    branches = dict(enumerate(path for path, _ in maximal_paths(len(limbs.vertices), limbs.edges)))
+    at = defaultdict[int, list[int]](list)
+    for number, path in branches.items():
+        at[path[0]].append(number)
+        at[path[-1]].append(number)
+    waiting = [(limb.probability, tip) for tip, limb in limbs.judged.items()]
+    heapq.heapify(waiting)
+    while waiting:
+        _, tip = heapq.heappop(waiting)
+        number = at[tip][0]
+        path = branches[number] if branches[number][-1] == tip else branches[number][::-1]
+        junction = path[0]
+        if len(at[junction]) < 3:
+            continue
+        yield limbs.judged[tip], path
+        at[junction].remove(number)
+        if len(at[junction]) == 2 and at[junction][0] != at[junction][1]:
+            one, other = at.pop(junction)
+            first, second = branches[one], branches.pop(other)
+            first = first if first[-1] == junction else first[::-1]
+            second = second if second[0] == junction else second[::-1]
+            branches[one] = first + second[1:]
+            at[second[-1]][at[second[-1]].index(other)] = one
+
+
+def with_limbs(skeleton: Skeleton, least: float) -> Skeleton:
+    """A skeleton with all branches that are limbs with a probability of at least `least`, and without others.
+
+    Points of branches that go belong to the junction; those nearer to a branch that comes than to their vertex to it.
+    """
+    limbs, m = all_limbs(skeleton), len(skeleton.vertices)
+    into, gone = np.arange(len(limbs.vertices)), dict[Decision, list[int]]()
+    for limb, path in takewhile(lambda each: each[0].probability < least, pruning_order(limbs)):
+        into[path[1:]] = path[0]
+        gone[limb] = path
+    stays = into == np.arange(len(into))
+    if stays[:m].all() and not stays[m:].any():
         return skeleton
-    more = np.concatenate([limb.branch[1:] for limb in limbs])
-    known = {name: np.r_[getattr(skeleton, name), np.full(len(more), np.nan)] for name in OF_VERTICES}
-    m, radii = len(skeleton.vertices), np.concatenate([limb.radii[1:] for limb in limbs])
+    owner = np.append(final_representatives(into)[:m], -1)[skeleton.vertex_of_point]
+    more, rows = m + np.flatnonzero(stays[m:]), np.flatnonzero(owner >= 0)
+    if len(more) and len(rows):
+        points = skeleton.points[rows]
+        distance, nearest = cKDTree(limbs.vertices[more]).query(points)
+        nearer = distance < norm(points - limbs.vertices[owner[rows]])
+        owner[rows[nearer]] = more[nearest[nearer]]
+    unknown = np.full(len(into) - m, np.nan)
+    known = {name: np.r_[getattr(skeleton, name), unknown] for name in OF_VERTICES}
     for name in ("radii", "half_width", "half_thickness"):
-        known[name][m:] = radii
-    owner = skeleton.vertex_of_point.copy()
-    rows = np.flatnonzero(owner >= 0)
-    points = skeleton.points[rows]
-    distance, nearest = cKDTree(more).query(points)
-    nearer = distance < norm(points - skeleton.vertices[owner[rows]])
-    owner[rows[nearer]] = m + nearest[nearer]
-    back = set(limbs)
-    decisions = [
-        replace(it, changed=False, branch=(), radii=()) if it in back else it for it in skeleton.report.decisions
+        known[name][m:] = limbs.radii[m:]
+    decisions, back = [], {limb for limb in limbs.judged.values() if limb.changed} - set(gone)
+    for each in skeleton.report.decisions:
+        if each.changed or each not in gone:
+            decisions.append(replace(each, changed=False, branch=(), radii=()) if each in back else each)
+    decisions += [
+        limb_decision(limbs.vertices, limbs.radii, limb.probability, path, pruned=True)
+        for limb, path in gone.items()
+        if not limb.changed
     ]
+    index = np.append(np.cumsum(stays) - 1, -1)
     return replace(
         skeleton,
-        **known,
-        vertices=np.concatenate([skeleton.vertices, more]),
-        edges=np.concatenate([skeleton.edges, *(np.column_stack([path[:-1], path[1:]]) for path in paths)]),
-        vertex_of_point=owner,
+        **{name: values[stays] for name, values in known.items()},
+        vertices=limbs.vertices[stays],
+        edges=index[limbs.edges[stays[limbs.edges].all(axis=1)]],
+        vertex_of_point=index[owner],
         report=replace(skeleton.report, decisions=tuple(decisions)),
     )
 
 
-def without_limbs(skeleton: Skeleton, least: float) -> Skeleton:
-    """A skeleton without branches that are limbs with a probability below `least`, at each junction the least first."""
-    while True:
-        worst: dict[int, tuple[Decision, np.ndarray]] = {}
-        for number, limb in judged_branches(skeleton).items():
-            path = skeleton.branches[number]
-            path = path[::-1] if skeleton.degree[path[0]] == 1 else path
-            before = worst.get(int(path[0]))
-            if limb.probability < (before[0].probability if before else least):
-                worst[int(path[0])] = limb, path
-        if not worst:
-            return skeleton
-        group, gone = np.arange(len(skeleton.vertices)), {limb for limb, _ in worst.values()}
-        for _, path in worst.values():
-            group[path] = path[0]
-        stays = [it for it in skeleton.report.decisions if it not in gone]
-        cut = [limb_decision(skeleton, limb.probability, path, pruned=True) for limb, path in worst.values()]
-        skeleton = replace(merge_into(skeleton, group), report=replace(skeleton.report, decisions=(*stays, *cut)))
+def _judged_ends(skeleton: Skeleton) -> dict[int, Decision]:
+    """The decisions about limbs that were kept, each by the vertex at the end that it is about.
+
+    Ends have moved since: the nearest decisions and ends belong together. The root of a tree is no limb's end.
+    """
+    kept = [it for it in skeleton.report.decisions if it.about == "limb" and not it.changed]
+    reach: dict[int, float] = {}
+    for path in skeleton.branches:
+        path = path if skeleton.degree[path[-1]] == 1 else path[::-1]
+        if skeleton.degree[path[-1]] == 1 and skeleton.degree[path[0]] > 2:
+            tip, length = int(path[-1]), float(arc_lengths(skeleton.vertices[path])[-1])
+            reach[tip] = max(END_MOVES * float(skeleton.radii[tip]), length)
+    if root := skeleton.report.root:
+        reach.pop(int(norm(skeleton.vertices - root).argmin()), None)
+    if not kept or not reach:
+        return {}
+    tips = list(reach)
+    near = min(NEAREST_TIPS, len(tips))
+    distance, nearest = cKDTree(skeleton.vertices[tips]).query([it.place for it in kept], range(1, near + 1))
+    found: dict[int, Decision] = {}
+    free = set(range(len(kept)))
+    for pair in np.argsort(distance, axis=None, kind="stable").tolist():
+        k, tip = pair // near, tips[nearest.flat[pair]]
+        if k in free and tip not in found and distance.flat[pair] <= reach[tip]:
+            found[tip] = kept[k]
+            free.discard(k)
+    return found

@@ -49,23 +49,27 @@ def prune_spurs(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
             if twig.probability < (before.probability if before else least):
                 worst[twig.junction] = twig
         if not worst:
-            decisions += [limb_decision(skeleton, twig.probability, np.array([twig.tip]), False) for twig in found]
+            curve = skeleton.vertices, skeleton.radii
+            decisions += [limb_decision(*curve, twig.probability, [twig.tip], pruned=False) for twig in found]
             return with_fields(skeleton, normals=given.normals), decisions
         group = np.arange(len(skeleton.vertices))
         for twig in worst.values():
             group[twig.body] = twig.junction
-            decisions.append(limb_decision(skeleton, twig.probability, np.r_[twig.junction, twig.body], True))
+            path = [twig.junction, *twig.body.tolist()]
+            decisions.append(limb_decision(skeleton.vertices, skeleton.radii, twig.probability, path, pruned=True))
         # points of a cut branch are farther from its junction than the surface there is: they have no say any more
         gone = np.isin(skeleton.vertex_of_point, np.concatenate([twig.body for twig in worst.values()]))
         normals = np.where(gone[:, None], np.nan, skeleton.normals)
         skeleton = merge_into(with_fields(skeleton, normals=normals), group)
 
 
-def limb_decision(skeleton: Skeleton, probability: float, path: np.ndarray, pruned: bool) -> Decision:
+def limb_decision(
+    vertices: np.ndarray, radii: np.ndarray, probability: float, path: list[int], *, pruned: bool
+) -> Decision:
     """The decision about a branch, a path of vertices from its junction to its tip; of a pruned one with its curve."""
-    places = [tuple(place) for place in skeleton.vertices[path].tolist()]
-    curve = dict(branch=tuple(places), radii=tuple(skeleton.radii[path].tolist())) if pruned else {}
-    return Decision("limb", places[-1], probability, pruned, **curve)
+    places = tuple(tuple(place) for place in vertices[path].tolist())
+    curve = (places, tuple(radii[path].tolist())) if pruned else ()
+    return Decision("limb", places[-1], probability, pruned, *curve)
 
 
 def limb_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[int, dict[str, float]]]:

@@ -19,7 +19,7 @@ from ..decisions import coordinates
 from ..interop.atomic import check_ending, write_atomically
 from ..interop.packages import require
 from ..io.colors import shades
-from ..refinement.detail import grafts, judged_branches
+from ..refinement.detail import all_limbs, pruning_order
 from ..report import Markup, Report, markup
 from ..skeleton import Skeleton
 from .figures import MOST_DRAWN_POINTS, thinned
@@ -120,26 +120,26 @@ def _data(skeleton: Skeleton, shown: np.ndarray) -> dict[str, Any]:
         "branch_of_vertex": _packed(branch_of_vertex(skeleton), "<i4"),
         "edges": _packed(np.concatenate([skeleton.edges, np.column_stack([lone, lone])]), "<u4"),
         "branch_of_edge": _packed(np.concatenate([branch_of_edge(skeleton), dots]), "<i4"),
-        **_limbs(skeleton, len(lone), centre, unit),
+        **_detail(skeleton, len(lone), centre, unit),
     }
 
 
-def _limbs(skeleton: Skeleton, n_lone: int, centre: np.ndarray, unit: float) -> dict[str, Any]:
-    """Pruned branches, the probabilities by which the view shows them and hides others, and that from which it does."""
-    ends, chance = np.empty((0, 2, 4)), np.ones(len(skeleton.branches))
-    judged = judged_branches(skeleton)
-    chance[list(judged)] = [limb.probability for limb in judged.values()]
-    pruned, spheres = [], np.column_stack([(skeleton.vertices - centre) / unit, skeleton.radii / unit])
-    for limb, path in grafts(skeleton, 0.0):
-        more = np.column_stack([(np.array(limb.branch[1:]) - centre) / unit, np.array(limb.radii[1:]) / unit])
-        spheres = np.concatenate([spheres, more])
-        ends = np.concatenate([ends, spheres[np.column_stack([path[:-1], path[1:]])]])
-        pruned += [limb.probability] * (len(path) - 1)
-    most, least = max(pruned, default=0.0), min(chance, default=1.0)
+def _detail(skeleton: Skeleton, n_lone: int, centre: np.ndarray, unit: float) -> dict[str, Any]:
+    """Pieces of pruned branches, and the probabilities by which the view shows all pieces; that from which it does."""
+    limbs = all_limbs(skeleton)
+    chance = np.ones(len(limbs.vertices))
+    for limb, path in pruning_order(limbs):
+        chance[path[1:]] = limb.probability
+    of_edge, of_limb = chance[limbs.edges].min(axis=1), [limb.probability for limb in limbs.judged.values()]
+    m, given, now = len(skeleton.vertices), len(skeleton.edges), [limb.changed for limb in limbs.judged.values()]
+    most = max((each for each, pruned in zip(of_limb, now, strict=True) if pruned), default=0.0)
+    least = min((each for each, pruned in zip(of_limb, now, strict=True) if not pruned), default=1.0)
+    spheres = np.column_stack([(limbs.vertices - centre) / unit, np.nan_to_num(limbs.radii / unit)])
     return {
-        "pruned": _packed(np.nan_to_num(ends), "<f4"),
-        "chance": _packed(np.concatenate([chance[branch_of_edge(skeleton)], np.ones(n_lone), pruned]), "<f4"),
-        "limb": 0.5 if most < 0.5 <= least else float(most + least) / 2,
+        "pruned": _packed(spheres[limbs.edges[given:]], "<f4"),
+        "chance": _packed(np.concatenate([of_edge[:given], np.ones(n_lone), of_edge[given:]]), "<f4"),
+        "chance_of_vertex": _packed(chance[:m], "<f4"),
+        "limb": 0.5 if most < 0.5 <= least else (most + least) / 2,
     }
 
 

@@ -6,7 +6,17 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
-from glsk_o3d import InvalidParameterError, editing, read_skeleton, save_skeleton, skeletonize
+from glsk_o3d import (
+    FileFormatError,
+    InvalidParameterError,
+    editing,
+    pipelines,
+    read_skeleton,
+    samples,
+    save_skeleton,
+    skeletonize,
+)
+from glsk_o3d.decisions import Decision
 from glsk_o3d.samples import torus, y_junction
 from glsk_o3d.samples.capsules import union_sample
 from glsk_o3d.skeleton import Skeleton
@@ -45,6 +55,58 @@ def test_what_goes_comes_back(stout):
         assert back.length == pytest.approx(stout.length)
         limbs = [it for it in there.report.decisions if it.about == "limb"]
         assert not any(it.changed for it in limbs if it.probability >= limb)  # of others the last two ends stay
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_all_and_none_and_back(seed):
+    """A sure limb does not go with a weak one beyond its junction."""
+    rng = np.random.default_rng(seed)
+    nodes, edges, judged = [[0.0, 0, 0], [1, 0, 0]], [(0, 1)], []
+    for _ in range(12):  # each branch from a vertex that has two edges
+        free = np.flatnonzero(np.bincount(np.ravel(edges)) == 2)
+        start = int(rng.choice(free)) if len(free) else 1
+        path = np.array(nodes[start]) + np.cumsum(rng.normal(size=(3, 3)), axis=0)
+        edges += [(start, len(nodes)), (len(nodes), len(nodes) + 1), (len(nodes) + 1, len(nodes) + 2)]
+        nodes += path.tolist()
+    plain = Skeleton(nodes, edges, np.full(len(nodes), 0.1), (), (), ())
+    chances = rng.permutation(len(plain.leaves)) / len(plain.leaves) * 0.4 + 0.55
+    tips = map(tuple, plain.vertices[plain.leaves].tolist())
+    judged = [Decision("limb", tip, chance, False) for tip, chance in zip(tips, chances.tolist(), strict=True)]
+    skeleton = replace(plain, report=replace(plain.report, decisions=tuple(judged)))
+    for limb in (0.6, 0.8, 1.0):
+        back = editing.detailed(editing.detailed(skeleton, limb=limb), limb=0.5)
+        assert len(back.leaves) == len(skeleton.leaves)
+        assert back.length == pytest.approx(skeleton.length)
+    kept = {it.place for it in editing.detailed(skeleton, limb=0.75).report.decisions if not it.changed}
+    assert kept >= {it.place for it in judged if it.probability >= 0.75}
+
+
+def test_a_root_stays():
+    tree = pipelines.tree()(samples.tree(4000, forks=3).points)
+    bare = editing.detailed(tree, limb=1)
+    assert len(bare.leaves) < len(tree.leaves)
+    np.testing.assert_array_equal(bare.vertices[0], tree.vertices[0])
+    assert bare.report.root == tuple(bare.vertices[0].tolist())
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        dict(probability=1.5),
+        dict(probability=float("nan")),
+        dict(place=(0.0, float("inf"), 0.0)),
+        dict(branch=((0.0, 0.0, 0.0),), radii=(1.0,)),
+        dict(branch=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), radii=(1.0,)),
+        dict(branch=((0.0, 0.0, 0.0), (1e300, 0.0, 0.0)), radii=(1.0, 1.0)),
+        dict(branch=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), radii=(1.0, -1.0)),
+    ],
+)
+def test_files_with_impossible_decisions_are_refused(stout, tmp_path, wrong):
+    first, *others = stout.report.decisions
+    report = replace(stout.report, decisions=(replace(first, **wrong), *others))
+    save_skeleton(replace(stout, report=report), tmp_path / "wrong.json")
+    with pytest.raises(FileFormatError, match="decision"):
+        read_skeleton(tmp_path / "wrong.json")
 
 
 def test_a_branch_that_comes_back_has_its_points_and_radius(stout):

@@ -22,6 +22,7 @@
   const measures = { radius: radii, confidence: new Float32Array(bytes(data.confidence)) };
   const pruned = new Float32Array(bytes(data.pruned)); // both ends of pieces: place and radius
   const chance = new Float32Array(bytes(data.chance)); // that it is of a limb, of each edge and then of each of these
+  const chanceOfVertex = new Float32Array(bytes(data.chance_of_vertex));
   const nPoints = vertexOfPoint.length, nPieces = chance.length;
   const order = Array.from(chance.keys()).sort((a, b) => chance[b] - chance[a]); // so that the first ones are shown
   const GREY = [136, 142, 148];
@@ -220,7 +221,7 @@
     gl.uniform1f(pieces.uniform("thin"), thin);
     gl.uniform4fv(pieces.uniform("plain"), plain);
     gl.uniform1f(pieces.uniform("opacity"), opacity);
-    const shown = chance.reduce((count, value) => count + (value >= element("limb").value), 0);
+    const limb = +element("limb").value, shown = chance.reduce((count, value) => count + (value >= limb), 0);
     gl.drawElementsInstanced(gl.TRIANGLES, triangles.length, gl.UNSIGNED_SHORT, 0, shown);
   };
   const use = ({ made, uniform }) => {
@@ -280,12 +281,14 @@
   element("cloud").parentNode.hidden = !nPoints;
   for (const name of ["skeleton", "colour"]) element(name).parentNode.hidden = !nPieces;
   element("tubes").parentNode.hidden = !("radius" in data.ranges && nPieces);
-  element("limb").value = data.limb;
-  element("limb").parentNode.hidden = !chance.some((value) => value < 1);
-  element("limb").addEventListener("input", () => {
+  const turn = () => {
     element("limb").nextElementSibling.textContent = (+element("limb").value).toFixed(2);
     redraw();
-  });
+  };
+  element("limb").value = data.limb;
+  element("limb").parentNode.hidden = !chance.some((value) => value < 1);
+  element("limb").addEventListener("input", turn);
+  turn();
   document.querySelectorAll("[data-view]").forEach((button) =>
     button.addEventListener("click", () => look(button.dataset.view)));
   element("save").addEventListener("click", () => {
@@ -346,6 +349,7 @@
     let found = -1, nearest = 12;
     if (element("skeleton").checked || element("tubes").checked) {
       for (let v = 0; v < radii.length; v++) {
+        if (chanceOfVertex[v] < +element("limb").value) continue;
         const away3 = [0, 1, 2].map((k) => vertices[3 * v + k] - aim[k]);
         const [x, y, z] = axes.map((axis) => dot(axis, away3));
         const px = box.width * (0.5 + (0.5 * fx * x) / (away - z)), py = box.height * (0.5 - (0.5 * fy * y) / (away - z));
