@@ -244,6 +244,12 @@ class Skeleton:
         return lines
 
 
+def check_skeleton(value: Any) -> None:
+    """Raise InvalidParameterError if a value is no Skeleton."""
+    if not isinstance(value, Skeleton):
+        raise InvalidParameterError(f"a {type(value).__name__} is no Skeleton: make one with skeletonize")
+
+
 def of_input(skeleton: Skeleton) -> Skeleton:
     """A skeleton with the points that were given alone: without those by area that stood for a mesh."""
     n, report = len(skeleton.points), skeleton.report

@@ -11,7 +11,7 @@ from ..numerics.cycles import edges_on_cycles
 from ..numerics.polylines import arc_lengths, place_at, relative_distance
 from ..numerics.vectors import Floats, Ints, norm
 from ..refinement.rooted import root_among
-from ..skeleton import Skeleton
+from ..skeleton import Skeleton, check_skeleton
 from .rows import Rows
 from .segmentation import branch_of_point
 
@@ -133,6 +133,7 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
     >>> sorted(table.level.tolist())
     [0, 1, 1]
     """
+    check_skeleton(skeleton)
     m = len(skeleton.vertices)
     if m == 0:
         raise InvalidParameterError("the skeleton is empty: it has no branches to measure")

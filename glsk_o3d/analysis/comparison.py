@@ -9,7 +9,7 @@ from scipy.spatial.distance import cdist
 
 from ..errors import InvalidParameterError
 from ..numerics.groups import component_labels
-from ..skeleton import Skeleton
+from ..skeleton import Skeleton, check_skeleton
 from .curves import check_graph, places_along, simple_edges
 from .summary import structure
 
@@ -110,7 +110,7 @@ def compare(skeleton: Skeleton, truth: Any) -> Comparison:
     ----------
     skeleton : Skeleton
         Only `vertices`, `edges` and `radii` count. If it has edges, vertices without an edge count as components alone.
-    truth : Truth, Sample, or anything else with `nodes`, `edges` and `radii`
+    truth : Truth, Sample, another Skeleton, or anything else with `nodes`, `edges` and `radii`
         In the units of the skeleton.
 
     Returns
@@ -130,7 +130,10 @@ def compare(skeleton: Skeleton, truth: Any) -> Comparison:
     >>> compare(Skeleton(ring.nodes, ring.edges, ring.radii, (), (), ()), ring).topology
     True
     """
-    truth = truth if isinstance(truth, Truth) else Truth(truth.nodes, truth.edges, truth.radii)
+    check_skeleton(skeleton)
+    if not isinstance(truth, Truth):
+        nodes = truth.vertices if isinstance(truth, Skeleton) else getattr(truth, "nodes", ())
+        truth = Truth(nodes, getattr(truth, "edges", ()), getattr(truth, "radii", ()))
     none = np.empty(0)
     axis = Skeleton(truth.nodes, simple_edges(truth.edges), truth.radii, none, none, none)
     if len(skeleton.vertices) == 0:

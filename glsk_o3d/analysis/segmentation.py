@@ -9,7 +9,7 @@ from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.clouds import cloud_points
 from ..numerics.polylines import nearest_on_edges
 from ..numerics.vectors import finite_rows
-from ..skeleton import Skeleton
+from ..skeleton import Skeleton, check_skeleton
 from .curves import along, pieces
 
 PIECES_PER_CURVE = 4000  # fitted: that a curve is cut into, to find the one nearest to a point
@@ -54,6 +54,7 @@ def vertex_of_cloud(skeleton: Skeleton, cloud: Any = None) -> tuple[np.ndarray, 
 
     (N, 3) float64 and (N,) int64 array.
     """
+    check_skeleton(skeleton)
     if len(skeleton.vertices) == 0:
         raise InvalidParameterError("the skeleton is empty: there is nothing to label points with")
     if cloud is None:

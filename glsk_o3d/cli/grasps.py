@@ -48,7 +48,8 @@ def grasps(
 
 
 def _print(best: analysis.GraspCandidates, found: int) -> None:
-    echo(f"{found} grasps at {best.places} places")
+    first = f", the first {len(best)} of them here: -n for more" if len(best) < found else ""
+    echo(f"{found} grasps at {best.places} places{first}")
     for reason, times in best.left_out.items():
         limit = " (confidence below --min-confidence)" if reason == "uncertain" else ""
         echo(f"left out: {times} {reason}{limit}")

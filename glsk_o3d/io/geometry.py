@@ -11,7 +11,7 @@ from ..interop.packages import import_open3d
 from ..numerics.neighbourhoods import plane_axes
 from ..numerics.vectors import TINY
 from ..parameters import check_number
-from ..skeleton import Skeleton
+from ..skeleton import Skeleton, check_skeleton
 from .colors import ColorChoice, shades
 
 
@@ -40,6 +40,7 @@ def to_line_set(skeleton: Skeleton, color: ColorChoice = "branch") -> Any:
     >>> len(to_line_set(ring, "radius").colors) == len(ring.edges)
     True
     """
+    check_skeleton(skeleton)
     lines = skeleton.to_line_set()
     shown = shades(skeleton, color, branch_of_edge(skeleton), skeleton.edges)
     lines.colors = import_open3d().utility.Vector3dVector(np.ascontiguousarray(shown).reshape(-1, 3))
@@ -81,6 +82,7 @@ def to_tubes(skeleton: Skeleton, color: ColorChoice = "branch", *, radius: float
     >>> to_tubes(skeletonize(torus(1000).points)).has_vertex_normals()
     True
     """
+    check_skeleton(skeleton)
     check_number("sides", sides, "int", low=3)
     check_number("radius", radius, "float?", low=0, open_low=True)
     radii = skeleton.radii if radius is None else np.full(len(skeleton.vertices), float(radius))

@@ -6,8 +6,8 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
-from glsk_o3d import read_truth, save_skeleton
-from glsk_o3d.analysis import Truth, compare
+from glsk_o3d import annotate, read_truth, save_skeleton, skeletonize, to_line_set, to_tubes
+from glsk_o3d.analysis import Truth, branch_table, compare, segment
 from glsk_o3d.analysis.comparison import matching_f1
 from glsk_o3d.analysis.curves import distances
 from glsk_o3d.errors import FileFormatError, InvalidParameterError
@@ -228,3 +228,27 @@ def test_a_skeleton_in_other_units_is_told_before_the_memory_is_full(axis_of):
     far = Skeleton(1e12 * far.vertices, far.edges, far.radii, (), (), ())
     with pytest.raises(InvalidParameterError, match=r"^the skeleton is .* long, too long for places .* apart"):
         compare(far, sample)
+
+
+def test_two_skeletons_are_compared():
+    one, other = (skeletonize(y_junction(1500, seed=seed).points) for seed in (0, 1))
+    found = compare(one, other)
+    assert found.perfect
+    assert found.error < 0.1
+    assert compare(one, one).error == 0
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda cloud: compare(cloud, torus(100)),
+        branch_table,
+        segment,
+        annotate,
+        to_tubes,
+        to_line_set,
+    ],
+)
+def test_a_cloud_is_no_skeleton(ask):
+    with pytest.raises(InvalidParameterError, match="a ndarray is no Skeleton: make one with skeletonize"):
+        ask(np.zeros((9, 3)))

@@ -26,7 +26,7 @@ def test_lines_files_and_json_agree(invoke, tmp_path, rod):
     result = invoke(*words, "-o", "g.json")
     assert (result.exit_code, result.stderr) == (0, "")
     lines = result.stdout.splitlines()
-    assert lines[0] == f"{len(found)} grasps at 9 places"
+    assert lines[0] == f"{len(found)} grasps at 9 places, the first 5 of them here: -n for more"
     assert lines[1] == f"left out: {5 * 9} ways in behind the plane"
     assert lines[-1] == "wrote g.json"
     rows = [line for line in lines if line.endswith(" 0") and "left out" not in line]
