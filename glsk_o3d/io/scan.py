@@ -14,6 +14,7 @@ import numpy as np
 from ..errors import InvalidParameterError, did_you_mean
 from ..interop.packages import import_open3d
 from ..points import on_surface
+from ..report import warn
 from ..sampler import Sampler
 
 COLOR_CHANNELS = ["red", "green", "blue"]
@@ -58,6 +59,8 @@ class Scan:
     def by_area(self, sample: Any = "auto") -> Scan:
         """The points that stand for a mesh, see `Sampler.sample`, with normals, and all else as a corner has it."""
         places, corners, normals, _ = on_surface((self.positions, self.triangles), Sampler(sample=sample).sample)
+        if isinstance(sample, int) and not len(places):
+            warn([f"sample = {sample}: the file has no triangles with an area: its points are taken"])
         return replace(self[corners[:, 0]], positions=places, normals=normals) if len(places) else self
 
     def chosen(self, where: str) -> np.ndarray:

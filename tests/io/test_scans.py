@@ -9,7 +9,7 @@ import open3d as o3d
 import pytest
 
 from glsk_o3d import save_skeleton
-from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
+from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError, SkeletonWarning
 from glsk_o3d.io.formats.text_tables import holds_points
 from glsk_o3d.io.paths import CLOUD_ENDINGS, MESH_ENDINGS
 from glsk_o3d.io.scans import promised_points, read_blocks, read_cloud, read_mesh, read_scan, read_tensor_cloud
@@ -302,3 +302,9 @@ def test_files_that_break_off_are_refused_wherever(tmp_path, capfd, name):
         path.write_bytes(whole[:-60])
         with pytest.raises(FileFormatError, match=r"promises 53 points and holds 5[012]: it is truncated"):
             read_blocks(path, rows=10)
+
+
+def test_a_cloud_is_not_sampled_by_area(tmp_path):
+    np.savetxt(tmp_path / "cloud.xyz", np.random.default_rng(0).random((50, 3)))
+    with pytest.warns(SkeletonWarning, match="sample = 20: the file has no triangles"):
+        assert len(read_cloud(tmp_path / "cloud.xyz", sample=20).points) == 50
