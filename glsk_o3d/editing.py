@@ -87,8 +87,9 @@ def cut_loops(skeleton: Skeleton) -> tuple[Skeleton, np.ndarray]:
 def detailed(skeleton: Skeleton, *, limb: float) -> Skeleton:
     """Turn the detail up or down: limbs from another probability on than `Refiner.limb`, without a new run.
 
-    The least probable branch goes first. Pruned branches come back as they were when they were pruned, to the nearest
-    vertex. What goes can come back, too. The root of a tree stays.
+    The least probable branch goes first; what is then left at its junction is one branch, and a limb if one of those
+    beyond the junction is. What goes can come back, with its curve and radii, but without confidence, sections and
+    support, and with the points nearest to it. The root of a tree stays.
 
     Parameters
     ----------

@@ -26,12 +26,12 @@ def edit(
         option("TOLERANCE", "Drop vertices as long as the curve moves by no more than this.", "--simplify", min=0),
     ] = None,
 ) -> None:
-    """Shorten, thin out or reroot a skeleton.
+    """Turn the detail of a skeleton up or down, shorten, thin out or reroot it.
 
     What is asked for is done in the order of the options. Lengths are in the units of the file. Orders count from the
     root, the stem is 0.
     """
-    from .. import editing
+    from .. import FileFormatError, editing
     from ..analysis.summary import structure
     from ..io.skeletons import read_skeleton
 
@@ -39,8 +39,10 @@ def edit(
     check_outputs(outputs, skeleton, needed="an output with -o")
     before = edited = read_skeleton(skeleton)
     if limb is not None:
-        if not any(it.about == "limb" for it in before.report.decisions):
-            echo("no limb was judged: --limb needs the .json or .npz of a run with Refiner.limb above 0", err=True)
+        judged = any(it.about == "limb" for it in before.report.decisions)
+        if not judged and not any(stage.startswith("Refiner") for stage in before.report.stages):
+            needed = "--limb needs the .json or .npz of a run whose Refiner has a limb above 0"
+            raise FileFormatError(f"{skeleton}: holds no decisions about limbs: {needed}")
         edited = editing.detailed(edited, limb=limb)
     if largest:
         edited = editing.largest_component(edited)

@@ -14,11 +14,12 @@ from ..decisions import Decision
 from ..numerics.pairing import final_representatives
 from ..numerics.paths import maximal_paths
 from ..numerics.polylines import arc_lengths
-from ..numerics.vectors import norm
+from ..numerics.vectors import TINY, norm
 from ..skeleton import OF_VERTICES, Skeleton
 from .spurs import limb_decision
 
-END_MOVES = 3.0  # derived: radii, or all of a short branch, that its end may move while the curve is refined
+MOST_MOVED = 2.0  # derived: radii that an end, or all of its branch, or a junction moves while the curve is refined
+EVEN = 0.5  # derived: probability from which something is more likely than not
 NEAREST_TIPS = 8  # speed: of which a decision may be about one
 
 
@@ -32,10 +33,10 @@ class Limbs(NamedTuple):
 
 
 def all_limbs(skeleton: Skeleton) -> Limbs:
-    """A skeleton with its pruned branches, each joined to the vertex nearest to the junction that it left, but no end.
+    """A skeleton with its pruned branches, each joined to a vertex near the junction that it left, but no end.
 
-    The last one to be pruned is the first to come back, since others may have left it. Those that left a place where
-    nothing is any more are left out.
+    It is that whose ball, of its radius, has the old junction deepest inside. The last branch to be pruned is the first
+    to come back, since others may have left it. Those that left a place where nothing is any more are left out.
     """
     vertices, radii, edges, judged = skeleton.vertices, skeleton.radii, [skeleton.edges], _judged_ends(skeleton)
     inner = skeleton.degree > 1
@@ -43,9 +44,9 @@ def all_limbs(skeleton: Skeleton) -> Limbs:
         if limb.about != "limb" or not limb.changed or not limb.branch or not inner.any():
             continue
         places = np.array(limb.branch)
-        away = np.where(inner, norm(vertices - places[0]), np.inf)
-        junction = int(away.argmin())
-        if away[junction] <= END_MOVES * max(limb.radii[0], radii[junction]):
+        away = np.where(inner, norm(vertices - places[0]) / np.maximum(radii, TINY), np.inf)
+        junction = int(np.nanargmin(away))
+        if away[junction] <= MOST_MOVED:
             path = np.r_[junction, len(vertices) + np.arange(len(places) - 1)]
             edges.append(np.column_stack([path[:-1], path[1:]]))
             vertices, radii = np.concatenate([vertices, places[1:]]), np.r_[radii, limb.radii[1:]]
@@ -54,27 +55,34 @@ def all_limbs(skeleton: Skeleton) -> Limbs:
     return Limbs(vertices, radii, np.concatenate(edges), judged)
 
 
-def pruning_order(limbs: Limbs) -> Iterator[tuple[Decision, list[int]]]:
-    """The branches that leave a junction and end, as paths from there, in the order in which they go.
+def pruning_order(limbs: Limbs) -> Iterator[tuple[Decision, float, list[int]]]:
+    """The branches that leave a junction and end, as paths from there, with their probability, as they go.
 
-    The least probable limb goes first. Where two branches are left at a junction they are one from then on.
+    The least probable limb goes first. Where two branches are left at a junction they are one from then on: a limb if
+    one of those beyond the junction is, 1 - prod (1 - p), of which only those more probable than not count.
     """
     branches = dict(enumerate(path for path, _ in maximal_paths(len(limbs.vertices), limbs.edges)))
     at = defaultdict[int, list[int]](list)
     for number, path in branches.items():
         at[path[0]].append(number)
         at[path[-1]].append(number)
-    waiting = [(limb.probability, tip) for tip, limb in limbs.judged.items()]
+    chance = {tip: limb.probability for tip, limb in limbs.judged.items()}
+    waiting, none = [(each, tip) for tip, each in chance.items()], defaultdict[int, float](lambda: 1.0)
     heapq.heapify(waiting)
     while waiting:
-        _, tip = heapq.heappop(waiting)
+        before, tip = heapq.heappop(waiting)
+        if before < chance[tip]:
+            heapq.heappush(waiting, (chance[tip], tip))
+            continue
         number = at[tip][0]
         path = branches[number] if branches[number][-1] == tip else branches[number][::-1]
         junction = path[0]
         if len(at[junction]) < 3:
             continue
-        yield limbs.judged[tip], path
+        yield limbs.judged[tip], chance[tip], path
         at[junction].remove(number)
+        if chance[tip] > EVEN:  # others were mostly gone when the rest was judged
+            none[junction] *= 1 - chance[tip]
         if len(at[junction]) == 2 and at[junction][0] != at[junction][1]:
             one, other = at.pop(junction)
             first, second = branches[one], branches.pop(other)
@@ -82,18 +90,22 @@ def pruning_order(limbs: Limbs) -> Iterator[tuple[Decision, list[int]]]:
             second = second if second[0] == junction else second[::-1]
             branches[one] = first + second[1:]
             at[second[-1]][at[second[-1]].index(other)] = one
+            for end in (first[0], second[-1]):
+                if end in chance:
+                    chance[end] = 1 - (1 - chance[end]) * none[junction]
 
 
 def with_limbs(skeleton: Skeleton, least: float) -> Skeleton:
     """A skeleton with all branches that are limbs with a probability of at least `least`, and without others.
 
     Points of branches that go belong to the junction; those nearer to a branch that comes than to their vertex to it.
+    What samples of the cloud said about its parts is dropped.
     """
     limbs, m = all_limbs(skeleton), len(skeleton.vertices)
-    into, gone = np.arange(len(limbs.vertices)), dict[Decision, list[int]]()
-    for limb, path in takewhile(lambda each: each[0].probability < least, pruning_order(limbs)):
+    into, gone = np.arange(len(limbs.vertices)), dict[Decision, tuple[float, list[int]]]()
+    for limb, chance, path in takewhile(lambda each: each[1] < least, pruning_order(limbs)):
         into[path[1:]] = path[0]
-        gone[limb] = path
+        gone[limb] = chance, path
     stays = into == np.arange(len(into))
     if stays[:m].all() and not stays[m:].any():
         return skeleton
@@ -113,8 +125,8 @@ def with_limbs(skeleton: Skeleton, least: float) -> Skeleton:
         if each.changed or each not in gone:
             decisions.append(replace(each, changed=False, branch=(), radii=()) if each in back else each)
     decisions += [
-        limb_decision(limbs.vertices, limbs.radii, limb.probability, path, pruned=True)
-        for limb, path in gone.items()
+        limb_decision(limbs.vertices, limbs.radii, chance, path, pruned=True)
+        for limb, (chance, path) in gone.items()
         if not limb.changed
     ]
     index = np.append(np.cumsum(stays) - 1, -1)
@@ -124,7 +136,7 @@ def with_limbs(skeleton: Skeleton, least: float) -> Skeleton:
         vertices=limbs.vertices[stays],
         edges=index[limbs.edges[stays[limbs.edges].all(axis=1)]],
         vertex_of_point=index[owner],
-        report=replace(skeleton.report, decisions=tuple(decisions)),
+        report=replace(skeleton.report, decisions=tuple(decisions), support=(), n_draws=0, n_agreeing=0),
     )
 
 
@@ -139,7 +151,7 @@ def _judged_ends(skeleton: Skeleton) -> dict[int, Decision]:
         path = path if skeleton.degree[path[-1]] == 1 else path[::-1]
         if skeleton.degree[path[-1]] == 1 and skeleton.degree[path[0]] > 2:
             tip, length = int(path[-1]), float(arc_lengths(skeleton.vertices[path])[-1])
-            reach[tip] = max(END_MOVES * float(skeleton.radii[tip]), length)
+            reach[tip] = max(MOST_MOVED * float(skeleton.radii[tip]), length)
     if root := skeleton.report.root:
         reach.pop(int(norm(skeleton.vertices - root).argmin()), None)
     if not kept or not reach:

@@ -23,16 +23,24 @@ def some_vertices(skeleton: Skeleton, which: np.ndarray) -> dict[str, Any]:
 def merge_vertices(skeleton: Skeleton, group: np.ndarray) -> Skeleton:
     """Make one vertex of each group (M,), at the mean of its members weighted by the points they own.
 
-    Groups have any labels. Points of merged vertices belong to the merged one.
+    Groups have any labels. Points of merged vertices belong to the merged one. A vertex alone stays as it is, to the
+    last bit, so that what is known of it holds.
     """
     label, group = np.unique(group, return_inverse=True)
     n, weight = len(label), VertexPoints(skeleton).mass
     total = group_sum(weight, group, n)
     edges = np.sort(group[skeleton.edges], axis=1)
+    alone = np.bincount(group)[group] == 1
+
+    def merged(values: np.ndarray) -> Any:
+        means = (group_sum((weight * values.T).T, group, n).T / total).T
+        means[group[alone]] = values[alone]
+        return means
+
     known = some_vertices(skeleton, np.arange(len(group)))
     return replace(
         skeleton,
-        **{name: (group_sum((weight * values.T).T, group, n).T / total).T for name, values in known.items()},
+        **{name: merged(values) for name, values in known.items()},
         edges=np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0),
         vertex_of_point=np.append(group, -1)[skeleton.vertex_of_point],
     )

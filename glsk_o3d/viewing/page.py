@@ -128,8 +128,8 @@ def _detail(skeleton: Skeleton, n_lone: int, centre: np.ndarray, unit: float) ->
     """Pieces of pruned branches, and the probabilities by which the view shows all pieces; that from which it does."""
     limbs = all_limbs(skeleton)
     chance = np.ones(len(limbs.vertices))
-    for limb, path in pruning_order(limbs):
-        chance[path[1:]] = limb.probability
+    for _, each, path in pruning_order(limbs):
+        chance[path[1:]] = each
     of_edge, of_limb = chance[limbs.edges].min(axis=1), [limb.probability for limb in limbs.judged.values()]
     m, given, now = len(skeleton.vertices), len(skeleton.edges), [limb.changed for limb in limbs.judged.values()]
     most = max((each for each, pruned in zip(of_limb, now, strict=True) if pruned), default=0.0)

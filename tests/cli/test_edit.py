@@ -49,7 +49,9 @@ def test_detail_is_turned(invoke, tmp_path):
     assert len(read_skeleton(tmp_path / "less.json").leaves) == 0
     assert "leaves 0 -> 6" in invoke("edit", "less.json", "-o", "more.json", "--limb", 0.5).stdout
     save_skeleton(read_skeleton(tmp_path / "less.json"), tmp_path / "plain.ply")
-    assert "no limb was judged" in invoke("edit", "plain.ply", "-o", "same.json", "--limb", 0).output
+    refused = invoke("edit", "plain.ply", "-o", "same.json", "--limb", 0)
+    assert refused.exit_code == 1
+    assert "plain.ply: holds no decisions about limbs" in refused.output
     assert "less than or equal to 1" in invoke("edit", "less.json", "-o", "more.json", "--limb", 1.5).output
 
 
