@@ -6,7 +6,17 @@ from typing import Annotated, Any
 from typer import Option
 
 from .console import echo
-from .options import CutLoops, SkeletonFile, SkeletonOutput, argument, option, output_option, root_option
+from .options import (
+    CutLoops,
+    Preview,
+    ReportPage,
+    SkeletonFile,
+    SkeletonOutput,
+    argument,
+    option,
+    output_option,
+    root_option,
+)
 from .outputs import Output, check_outputs, skeleton_outputs, tell, write_each
 
 
@@ -25,6 +35,8 @@ def edit(
         float | None,
         option("TOLERANCE", "Drop vertices as long as the curve moves by no more than this.", "--simplify", min=0),
     ] = None,
+    preview: Preview = None,
+    report: ReportPage = None,
 ) -> None:
     """Turn the detail of a skeleton up or down, shorten, thin out or reroot it.
 
@@ -35,8 +47,8 @@ def edit(
     from ..analysis.summary import structure
     from ..io.skeletons import read_skeleton
 
-    outputs = skeleton_outputs(output)
-    check_outputs(outputs, skeleton, needed="an output with -o")
+    outputs = skeleton_outputs(output, preview, report, title=skeleton.name)
+    check_outputs(outputs, skeleton, needed="an output with -o, a --preview or a --report")
     before = edited = read_skeleton(skeleton)
     if limb is not None:
         judged = any(it.about == "limb" for it in before.report.decisions)

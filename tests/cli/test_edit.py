@@ -49,6 +49,8 @@ def test_detail_is_turned(invoke, tmp_path):
     assert len(read_skeleton(tmp_path / "less.json").leaves) == 0
     assert "leaves 0 -> 6" in invoke("edit", "less.json", "-o", "more.json", "--limb", 0.5).stdout
     save_skeleton(read_skeleton(tmp_path / "less.json"), tmp_path / "plain.ply")
+    seen = invoke("edit", "less.json", "--limb", 0, "--preview", "more.png", "--report", "more.html")
+    assert seen.stdout.splitlines()[1:] == ["wrote more.png", "wrote more.html"]
     refused = invoke("edit", "plain.ply", "-o", "same.json", "--limb", 0)
     assert refused.exit_code == 1
     assert "plain.ply: holds no decisions about limbs" in refused.output
