@@ -44,8 +44,8 @@ def all_limbs(skeleton: Skeleton) -> Limbs:
         if limb.about != "limb" or not limb.changed or not limb.branch or not inner.any():
             continue
         places = np.array(limb.branch)
-        away = np.where(inner, norm(vertices - places[0]) / np.maximum(radii, TINY), np.inf)
-        junction = int(np.nanargmin(away))
+        away = np.where(inner, norm(vertices - places[0]) / np.fmax(radii, TINY), np.inf)
+        junction = int(away.argmin())
         if away[junction] <= MOST_MOVED:
             path = np.r_[junction, len(vertices) + np.arange(len(places) - 1)]
             edges.append(np.column_stack([path[:-1], path[1:]]))

@@ -106,6 +106,18 @@ def test_a_branch_comes_back_to_the_part_that_it_left():
     assert [1, 5] in back.edges.tolist()
 
 
+def test_without_radii_nothing_comes_back():
+    """Nobody knows then what was near."""
+    turn = np.linspace(0, 2 * np.pi, 9)[:-1]
+    ring = Skeleton(
+        np.column_stack([np.cos(turn), np.sin(turn), 0 * turn]), [(k, (k + 1) % 8) for k in range(8)], (), (), (), ()
+    )
+    curve = ((1.0, 0.01, 0.0), (2.0, 0.0, 0.0))
+    gone = Decision("limb", curve[-1], 0.2, True, curve, (0.1, 0.1))
+    given = replace(ring, report=replace(ring.report, decisions=(gone,)))
+    assert editing.detailed(given, limb=0) is given
+
+
 def test_a_root_stays():
     tree = pipelines.tree()(samples.tree(4000, forks=3).points)
     bare = editing.detailed(tree, limb=1)
