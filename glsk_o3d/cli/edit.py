@@ -38,7 +38,7 @@ def edit(
     preview: Preview = None,
     report: ReportPage = None,
 ) -> None:
-    """Turn the detail of a skeleton up or down, shorten, thin out or reroot it.
+    """Turn detail up or down, prune, simplify or reroot a skeleton.
 
     What is asked for is done in the order of the options. Lengths are in the units of the file. Orders count from the
     root, the stem is 0.
