@@ -1,4 +1,4 @@
-"""What the cross-check says of clouds whose axis is known, and of scans.
+"""What the cross-check says of clouds whose axis is known, of meshes, and of scans.
 
 python benchmarks/crosscheck.py verdicts --builtin
 
@@ -7,68 +7,169 @@ The README beside this file says what each command shows.
 
 from __future__ import annotations
 
+import json
 import time
 from collections import Counter
+from itertools import pairwise
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
+import open3d as o3d
 import typer
 from _clouds import Case, cases
-from _runs import Folder, Jobs, Markdown, Output, Own, Shapes, Variants, application, run
-from _tables import number, present, save
+from _runs import Folders, Jobs, Markdown, Output, Own, Shapes, Variants, application, run
+from _tables import good, grouped, number, present, save
+from glsk_bench.scoring import score
+from glsk_bench.truths import read_axis
+from scipy.optimize import minimize
 
-from glsk_o3d import read_cloud
-from glsk_o3d.analysis import compare
+from glsk_o3d import read_cloud, skeletonize
 from glsk_o3d.crosscheck import cross_check
-from glsk_o3d.crosscheck.agreement import VERDICTS
+from glsk_o3d.crosscheck.agreement import VERDICTS, WEIGHTS
 
-EVERY = "clean_1024,clean_4096,density_4096,holes_4096,scan2_4096,noise1_4096,noise2_4096,outliers_4096"
-GOOD = dict(error=0.4, inside=0.9, completeness=0.9)  # and the right topology: a skeleton that deserves trust
+STEPS = (0, 0.25, 0.5, 0.75, 0.9, 0.96, 1)  # of the reliability table
+RIDGE = 0.05  # of the fit: what a weight costs
+FITTED = ("constant", "solid", "limbs", "doubt")
 
 app = application(__doc__)
 
 
-def checked(cloud: Case | Path) -> dict:
-    """The check of a cloud in numbers, and whether its skeleton is good if the axis is known."""
-    points, axis = (read_cloud(cloud), None) if isinstance(cloud, Path) else cloud.load()
-    start = time.process_time()
+def checked(cloud: Case | Path | tuple[Path, dict, bool]) -> dict:
+    """The check of a cloud in numbers, and whether the graph is right if the true one is known."""
+    if isinstance(cloud, Case):
+        points, axis = cloud.load()
+        axis = read_axis(cloud.folder / f"{cloud.shape}.npz") if cloud.folder else axis
+    else:
+        points = read_cloud(cloud) if isinstance(cloud, Path) else sampled(cloud[0], cloud[2])
+    seconds = [time.process_time()]
+    skeletonize(points)
+    seconds.append(time.process_time())
     check = cross_check(points)
-    seconds = time.process_time() - start
-    told = check.to_dict() | dict(cpu=seconds)
-    if axis is not None:
-        true = compare(check.skeleton, axis)
-        near = true.error < GOOD["error"] and min(true.inside, true.completeness) > GOOD["inside"]
-        told |= dict(error=true.error, good=bool(near and true.topology))
+    seconds.append(time.process_time())
+    told = check.to_dict() | dict(
+        cpu=seconds[2] - seconds[1], ratio=(seconds[2] - seconds[1]) / (seconds[1] - seconds[0])
+    )
+    skeleton = check.skeleton
+    if isinstance(cloud, Case):
+        told["right"] = score(axis, skeleton.vertices, skeleton.edges).perfect
+    elif not isinstance(cloud, Path):
+        known = cloud[1]
+        counts = (skeleton.n_components, skeleton.n_loops) == (known.get("components", 1), known["loops"])
+        low, high = known["ends"] or (0, np.inf)
+        told["right"] = bool((known["loops"] is None or counts) and low <= len(skeleton.leaves) <= high)
     return told
+
+
+def sampled(path: Path, poisson: bool) -> np.ndarray:
+    """8192 points of a mesh by area, or 4096 evenly spaced ones."""
+    mesh = o3d.io.read_triangle_mesh(str(path))
+    o3d.utility.random.seed(1)
+    return np.asarray((mesh.sample_points_poisson_disk(4096) if poisson else mesh.sample_points_uniformly(8192)).points)
 
 
 @app.command()
 def verdicts(
-    folder: Folder = None,
+    folders: Folders = None,
     own: Own = False,
-    variant: Variants = EVERY,
+    variant: Variants = "clean_4096,noise05_4096",
     shapes: Shapes = "",
+    meshes: Annotated[Path | None, typer.Option(metavar="DIR", help="Also meshes with manifest.json.")] = None,
     jobs: Jobs = 2,
     output: Output = None,
     markdown: Markdown = False,
 ) -> None:
-    """How often each verdict is given, and how often it is right."""
-    found = cases(folder, own, variant, shapes)
-    rows = run(checked, [(case.facts, (case,)) for case in found], jobs)
+    """How often each verdict is given, and how often the graph is right then."""
+    work: list[tuple[dict, tuple]] = []
+    if own or folders or not meshes:
+        work += [(case.facts, (case,)) for case in cases(folders, own, variant, shapes)]
+    for known in json.loads((meshes / "manifest.json").read_text())["meshes"] if meshes else ():
+        if known["loops"] is not None or known["ends"] is not None:
+            place = meshes / f"{known['name']}.ply"
+            for poisson, name in enumerate(("by area", "evenly spaced")):
+                facts = dict(variant=name, shape=known["name"], family="meshes")
+                work.append((facts, ((place, known, bool(poisson)),)))
+    rows = run(checked, work, jobs)
     save(output, rows)
-    lines = []
-    for name in (*dict.fromkeys(case.variant for case in found), "all"):
-        here = [row for row in rows if "failure" not in row and name in (row["variant"], "all")]
-        good = Counter((row["verdict"], row["good"]) for row in here)
-        failed = [row for row in rows if "failure" in row and name in (row["variant"], "all")]
-        note = f"{len(failed)} failed: {failed[0]['failure']}" if failed else ""
-        words = [f"{good[verdict, True]} / {good[verdict, True] + good[verdict, False]}" for verdict in VERDICTS]
-        angle = np.median([row["rows"]["angle"].get("median", np.nan) for row in here] or [np.nan])
-        apart = np.median([row["skeletons"]["distance_in_radii"] for row in here] or [np.nan])
-        lines.append([name, *words, number(angle, 1), number(apart, 2), note])
-    header = ["clouds", *VERDICTS, "angle", "apart", "note"]
-    present([("Good skeletons / verdicts", header, lines)], markdown)
+    tell(rows, markdown)
+
+
+@app.command()
+def fit(
+    files: Annotated[list[Path], typer.Argument(metavar="JSON...", exists=True)], markdown: Markdown = False
+) -> None:
+    """The weights of the probability, fitted to rows that `verdicts -o` has saved."""
+    rows = [row for file in files for row in good(json.loads(file.read_text())["rows"])]
+    values = np.array([[1.0, *facts(row).values()] for row in rows])
+    right = np.array([row["right"] for row in rows])
+
+    def loss(weights: np.ndarray) -> float:
+        total = np.where(right, -1, 1) * (values @ weights)
+        return float(np.logaddexp(0, total).sum() + RIDGE / 2 * (weights[1:] ** 2).sum())
+
+    weights = minimize(loss, np.zeros(len(FITTED))).x
+    lines = [[name, number(found, 2), number(WEIGHTS[name], 1)] for name, found in zip(FITTED, weights, strict=True)]
+    present([(f"{len(rows)} clouds", ["fact", "fitted", "in use"], lines)], markdown)
+
+
+def facts(row: dict[str, Any]) -> dict[str, float]:
+    """What the probability is made of; a mesh at fault says nothing of the solid and of limbs."""
+    found, solid = row["skeletons"], row["mesh"]
+    fault = any(reason.startswith("the mesh ") or reason.startswith("the mesh's own") for reason in row["reasons"])
+    counts = found["components"][0] == solid["solids"] and found["loops"][0] == solid["genus"]
+    limbs = bool(found["missing"] or found["extra"])
+    return dict(solid=float(not fault and not counts), limbs=float(not fault and limbs), doubt=found["doubt"])
+
+
+def tell(rows: list[dict], markdown: bool) -> None:
+    """Verdicts by family, what the promises come to, and how the probability is to be taken."""
+    lines, found = [], good(rows)
+    for name, here in [*grouped(rows, "family").items(), ("all", rows)]:
+        for variant in [*dict.fromkeys(row["variant"] for row in here)] if name != "all" else [""]:
+            some = [row for row in good(here) if variant in ("", row["variant"])]
+            count = Counter((row["verdict"], row["right"]) for row in some)
+            words = [f"{count[it, True]} / {count[it, True] + count[it, False]}" for it in VERDICTS]
+            told = [np.median([pick(row) for row in some]) if some else np.nan for pick in PICKED.values()]
+            lines.append(
+                [f"{name} {variant}".removesuffix("_4096").strip(), *words, *(number(value, 2) for value in told)]
+            )
+    noisy = [row["variant"].startswith("noise") for row in found]
+    verdict, right = np.array([row["verdict"] for row in found]), np.array([row["right"] for row in found], bool)
+    shares = {
+        "of 'agrees' the graph is right": right[verdict == VERDICTS[0]],
+        "of wrong graphs 'agrees'": (verdict == VERDICTS[0])[~right],
+        "of right graphs 'agrees'": (verdict == VERDICTS[0])[right],
+        "of clean clouds 'cannot tell'": (verdict == VERDICTS[3])[~np.array(noisy, bool)],
+        "of noisy clouds 'cannot tell'": (verdict == VERDICTS[3])[np.array(noisy, bool)],
+    }
+    promises = [
+        [name, str(len(held)), number(100 * held.mean(), 1) if len(held) else "-"] for name, held in shares.items()
+    ]
+    said, steps = np.array([row["probability"] for row in found]), []
+    for low, high in pairwise(STEPS):
+        here = (low <= said) & (said < high) & (verdict != VERDICTS[3])
+        if here.any():
+            steps.append(
+                [f"{low} to {high}", str(here.sum()), number(said[here].mean(), 2), number(right[here].mean(), 2)]
+            )
+    tables = [
+        ("Right graphs / verdicts", ["clouds", *VERDICTS, *PICKED], lines),
+        ("Shares", ["share", "clouds", "%"], promises),
+        ("Probability", ["said", "clouds", "mean", "right"], steps),
+    ]
+    failed = [row for row in rows if "failure" in row]
+    present(tables, markdown)
+    for row in failed:
+        typer.echo(f"{row['shape']} {row['variant']}: {row['failure']}", err=True)
+
+
+PICKED = {
+    "angle": lambda row: row["rows"]["angle"].get("median", np.nan),
+    "eigenvalues": lambda row: row["rows"]["eigenvalue_ratio"],
+    "apart": lambda row: row["skeletons"]["distance_in_radii"],
+    "CPU ratio": lambda row: row["ratio"],
+}
+"""Medians in the table of verdicts: the last is the check's CPU seconds over those of the skeleton alone."""
 
 
 @app.command()
@@ -81,19 +182,37 @@ def scans(
     """What the check says of some scans."""
     rows = run(checked, [(dict(cloud=path.stem), (path,)) for path in files], jobs)
     save(output, rows)
-    header = ["cloud", "points", "CPU s", "covered", "angle", "90 %", "apart", "95 %"]
-    header += ["components", "loops", "note"]
+    header = [
+        "cloud",
+        "points",
+        "CPU s",
+        "angle",
+        "eigenvalues",
+        "apart",
+        "loops",
+        "genus",
+        "parts",
+        "probability",
+        "note",
+    ]
     lines = []
     for row in rows:
         if "failure" in row:
             lines.append([row["cloud"], *["-"] * 9, row["failure"]])
             continue
-        of, apart = row["rows"], row["skeletons"]
-        angles = [number(of["angle"].get(name), 1) for name in ("median", "p90")]
-        distances = [number(apart[name], 2) for name in ("distance_in_radii", "hausdorff95_in_radii")]
-        counts = ["{}, {}".format(*apart[name]) for name in ("components", "loops")]
-        facts = [str(row["points"]["used"]), number(row["cpu"], 1), number(of["covered"], 2)]
-        lines.append([row["cloud"], *facts, *angles, *distances, *counts, row["verdict"]])
+        values = [number(pick(row), 2) for name, pick in PICKED.items() if name != "CPU ratio"]
+        mesh = [str(row["skeletons"]["loops"][0]), str(row["mesh"]["genus"]), str(row["mesh"]["solids"])]
+        lines.append(
+            [
+                row["cloud"],
+                str(row["points"]["given"]),
+                number(row["cpu"], 1),
+                *values,
+                *mesh,
+                number(row["probability"], 2),
+            ]
+            + [row["verdict"]]
+        )
     present([("Cross-checks", header, lines)], markdown)
 
 

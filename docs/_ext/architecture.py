@@ -14,7 +14,8 @@ PACKAGE = Path(__file__).resolve().parents[2] / "glsk_o3d"
 
 ROWS = (
     {"command line": ("cli", "__main__")},
-    {"cross-check": ("crosscheck",), "batches": ("batch",), "MeshLab": ("meshlab",)},
+    {"batches": ("batch",), "MeshLab": ("meshlab",)},
+    {"cross-check": ("crosscheck",)},
     {"pictures and windows": ("viewing",)},
     {"files": ("io",), "driver": ("driver", "resampling")},
     {"analysis": ("analysis", "editing"), "recipes and plugins": ("recipes",)},

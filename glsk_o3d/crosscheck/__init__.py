@@ -1,4 +1,4 @@
-"""The cross-check with a mesh of the same points: libigl's Laplacian on it, and its skeleton."""
+"""The cross-check with a mesh of its own: libigl's Laplacian on it, and the skeleton it contracts to."""
 
 from .check import CrossCheck, cross_check
 

@@ -1,26 +1,32 @@
-"""The check of a cloud against a mesh of it, with libigl: what is computed, and what it found."""
+"""The check of a cloud against a mesh, with libigl: what is computed, and what it found."""
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
+from ..analysis.agreement import SkeletonAgreement, compare_skeletons
 from ..contractor import Contractor
 from ..driver import as_pipeline
-from ..errors import InvalidParameterError
+from ..errors import InvalidCloudError, InvalidParameterError
 from ..interop.packages import require
-from ..numerics.morton import morton_order
+from ..numerics.inscribed_balls import outward_normals
+from ..numerics.neighbourhoods import spacing
+from ..numerics.operators import Operator, ring_operator
 from ..pipeline import Pipeline
-from ..points import surface_points
-from ..report import warn
+from ..points import Points
 from ..ring_builder import RingBuilder
 from ..skeleton import Skeleton
 from ..state import Contraction
 from ..thinner import Thinner
-from . import agreement
-from .mesh import ball_pivoting, mesh_skeleton
+from . import agreement, operators
+from .mesh import mesh_skeleton
+from .solid import Solid, ball_pivoting, given, poisson
 
-MOST_POINTS = 16384  # measured: they take about three seconds
+MADE_BY = ("auto", "poisson", "ball_pivoting")
+COMPARISON_STEP = 0.002  # precision: of the diagonal: spacing of the places where skeletons are compared
+LEAST_AREA = 1e-9  # precision: of a surface in the working frame
+DOUBTFUL_ANGLE = 30.0  # measured: degrees by which the mean curvature vectors differ where points are doubtful
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,70 +36,73 @@ class CrossCheck:
     Attributes
     ----------
     verdict : {"agrees", "agrees in part", "do not trust", "cannot tell"}
-        "cannot tell" if the skeletons differ because the mesh is bad.
+        "cannot tell" if cloud and mesh differ because the mesh is bad.
+    probability : float
+        That the skeleton has the right components, loops and limbs, as measured on shapes with known axes.
     reasons : tuple of str
-        The reasons against a better verdict.
-    n_input : int
-        Number of input points; `points` has fewer if the cloud was thinned.
-    rows, skeletons : RowAgreement, SkeletonAgreement
+        What speaks against it, with the places.
+    rows, skeletons, mesh : OperatorAgreement, SkeletonAgreement, MeshFacts
         The numbers that `to_dict` lists.
     points : (N, 3) float64 array
-        The used points, in the user's order and units, as all below.
+        The input points, in the user's order and units, as are the skeletons and the solid.
     angle : (N,) float64 array
-        Between our Laplacian coordinates and the mesh's, in degrees; NaN if not comparable, 0 where both are flat.
+        Between the mean curvature vectors of cloud and mesh, in degrees, of the contracted point that represents each;
+        NaN where the mesh is too far away, 0 where both are flat.
     skeleton, mesh_skeleton : Skeleton
-    vertices : (V, 3) float64 array
-        The mesh: the distinct points, denoised.
-    faces : (F, 3) int64 array
+    solid : Solid
+        The mesh.
+    ours, theirs : Operator
+        The Laplacians of the contracted points and of the mesh, in the working frame.
     """
 
     verdict: str
+    probability: float
     reasons: tuple[str, ...]
-    n_input: int
-    rows: agreement.RowAgreement
-    skeletons: agreement.SkeletonAgreement
+    rows: operators.OperatorAgreement
+    skeletons: SkeletonAgreement
+    mesh: agreement.MeshFacts
     points: np.ndarray = field(repr=False)
     angle: np.ndarray = field(repr=False)
     skeleton: Skeleton = field(repr=False)
     mesh_skeleton: Skeleton = field(repr=False)
-    vertices: np.ndarray = field(repr=False)
-    faces: np.ndarray = field(repr=False)
+    solid: Solid = field(repr=False)
+    ours: Operator = field(repr=False)
+    theirs: Operator = field(repr=False)
 
     @property
     def doubtful(self) -> np.ndarray:
-        """Points where the Laplacian coordinates differ by more than 30 degrees, or could not be compared."""
-        return ~(self.angle <= agreement.TURNED_ANGLE)
+        """Points where the mean curvature vectors differ by more than 30 degrees, or could not be compared."""
+        return ~(self.angle <= DOUBTFUL_ANGLE)
 
     def to_dict(self) -> dict[str, Any]:
         """The verdict and all numbers except those of single points, as for JSON."""
+        solid, rows = self.solid, asdict(self.rows)
+        counts = dict(vertices=len(solid.vertices), faces=len(solid.faces), solids=solid.n_solids, genus=solid.genus)
+        parts = dict(watertight=solid.is_watertight, parts=[part._asdict() for part in solid.parts])
         return {
             "verdict": self.verdict,
+            "probability": self.probability,
             "reasons": list(self.reasons),
-            "points": {
-                "given": self.n_input,
-                "used": len(self.points),
-                "turned": int((self.angle > agreement.TURNED_ANGLE).sum()),
-                "not_compared": int(np.isnan(self.angle).sum()),
-            },
-            "mesh": {"vertices": len(self.vertices), "faces": len(self.faces)},
-            "rows": asdict(self.rows),
+            "points": {"given": len(self.points), "doubtful": int(self.doubtful.sum())},
+            "mesh": {"made_by": solid.made_by, **counts, **parts, **asdict(self.mesh)},
+            "rows": rows | {"eigenvalues": rows["eigenvalues"].tolist()},
             "skeletons": asdict(self.skeletons),
         }
 
 
-def cross_check(cloud: Any, *, pipeline: Pipeline[Any] | str = "default") -> CrossCheck:
+def cross_check(cloud: Any, *, pipeline: Pipeline[Any] | str = "default", mesh: Any = "auto") -> CrossCheck:
     """Check a cloud's Laplacian and skeleton against those of a mesh, computed with libigl (Au et al. 2008).
-
-    A cloud of more than 16384 points is thinned to so many, evenly along its Morton curve, with a SkeletonWarning;
-    others come from the pipeline.
 
     Parameters
     ----------
     cloud : cloud
-        Anything `glsk_o3d.skeletonize` takes.
     pipeline : Pipeline or str
         ... | RingBuilder | Contractor | ... | Refiner. The mesh's skeleton is made with the same parameters but without
         reduction.
+    mesh : {"auto", "poisson", "ball_pivoting"}, TriangleMesh, or (vertices, faces)
+        "poisson" reconstructs a mesh with vertices of its own, "ball_pivoting" one with the cloud's points as vertices,
+        which tests the code more than the method. "auto" takes the triangles of `cloud` if it is a mesh that is not too
+        coarse, else "poisson". A mesh of the user's, in the cloud's units, has its edges halved where they are long.
 
     Returns
     -------
@@ -104,7 +113,7 @@ def cross_check(cloud: Any, *, pipeline: Pipeline[Any] | str = "default") -> Cro
     InvalidCloudError
         The points cannot be skeletonised, or no surface can be reconstructed.
     InvalidParameterError
-        The pipeline is wrong.
+        The pipeline or the mesh is wrong, or the mesh is too coarse.
     MissingPackageError
         libigl or Open3D is not installed.
 
@@ -112,46 +121,62 @@ def cross_check(cloud: Any, *, pipeline: Pipeline[Any] | str = "default") -> Cro
     --------
     >>> from glsk_o3d.samples import torus
     >>> check = cross_check(torus(2048).points)
-    >>> check.verdict, check.skeletons.loops
-    ('agrees', (1, 1))
+    >>> check.verdict, check.skeletons.loops, check.solid.genus
+    ('agrees', (1, 1), 1)
     """
     pipeline = as_pipeline(pipeline)
     kinds = [type(stage) for stage in pipeline.stages]
     if RingBuilder not in kinds or Contractor not in kinds:
         raise InvalidParameterError(f"pipeline = {pipeline!r}: must have a RingBuilder and a Contractor")
     require("igl")  # before the work that it is for
-    given = surface_points(cloud)
-    points = _thinned(given)
-    rings = kinds.index(RingBuilder) + 1
-    state: Contraction = Pipeline(*(each for each in pipeline.stages[:rings] if not isinstance(each, Thinner)))(points)
-    skeleton: Skeleton = Pipeline(*pipeline.stages[rings:])(state)
-    faces = ball_pivoting(state)
-    angle, rows = agreement.compare_rows(state, faces)
-    other = mesh_skeleton(state, faces, pipeline)
-    step = agreement.COMPARISON_STEP * state.frame.diagonal * state.frame.scale
-    skeletons = agreement.compare_skeletons(skeleton, other, step)
-    verdict, reasons = agreement.judge(rows, skeletons, skeleton.report.warnings, other.report)
+    rings = kinds.index(RingBuilder)
+    whole = kinds.index(Thinner) if Thinner in kinds[:rings] else rings
+    every = Pipeline(*pipeline.stages[:whole])(cloud) if whole else cloud
+    every = every if isinstance(every, Points) else Points.of(every)
+    points: Points = Pipeline(*pipeline.stages[whole:rings])(every) if whole < rings else every
+    state: Contraction = pipeline.stages[rings](points)
+    skeleton: Skeleton = Pipeline(*pipeline.stages[rings + 1 :])(state)
+
+    ours = ring_operator(state.positions, state.rings)
+    if not ours.area.sum() > LEAST_AREA:
+        raise InvalidCloudError("the points lie on a line: there is no surface to compare with")
+    dense = state if points is every else pipeline.stages[rings](every)
+    frame, body = state.frame, _body(cloud, mesh, dense, spacing(state.positions))
+    theirs = operators.mesh_operator(body)
+    angle, rows = operators.compare_operators(ours, state.rings, points.ring_normals, theirs, body)
+    facts = agreement.mesh_facts(body, dense.positions, dense.normals[dense.survivors])
+    body = replace(body, vertices=frame.out_of(body.vertices))
+    other = mesh_skeleton(body, pipeline)
+    step = COMPARISON_STEP * frame.diagonal * frame.scale
+    skeletons = compare_skeletons(skeleton, other, step)
+    verdict, probability, reasons = agreement.judge(rows, skeletons, body, facts, other.report.stop_reason)
     return CrossCheck(
         verdict=verdict,
+        probability=probability,
         reasons=reasons,
-        n_input=len(given),
         rows=rows,
         skeletons=skeletons,
-        points=points,
-        angle=np.where(state.has_normal, angle[state.representative_of_point], np.nan),
+        mesh=facts,
+        points=state.points,
+        angle=np.append(angle, np.nan)[state.survivor_of_point],
         skeleton=skeleton,
         mesh_skeleton=other,
-        vertices=state.frame.out_of(state.cloud),
-        faces=faces,
+        solid=body,
+        ours=ours,
+        theirs=theirs,
     )
 
 
-def _thinned(points: np.ndarray) -> np.ndarray:
-    """At most so many points, evenly along the Morton curve; and all that are not finite, for others to judge."""
-    finite = np.isfinite(points).all(axis=1)
-    good = np.flatnonzero(finite)
-    if len(good) <= MOST_POINTS:
-        return points
-    warn([f"{MOST_POINTS} of {len(good)} points are checked, spread evenly over the cloud"])
-    kept = np.linspace(0, len(good) - 1, MOST_POINTS).round().astype(int)
-    return points[np.sort(np.append(good[morton_order(points[good])[kept]], np.flatnonzero(~finite)))]
+def _body(cloud: Any, mesh: Any, dense: Contraction, apart: float) -> Solid:
+    """The mesh that is asked for, in the working frame; contracted points are so far apart."""
+    named = isinstance(mesh, str)
+    if named and mesh not in MADE_BY:
+        raise InvalidParameterError(f"mesh = {mesh!r}: must be one of {MADE_BY}, a mesh, or (vertices, faces)")
+    own = given(cloud if named else mesh, dense.frame, apart) if not named or mesh == "auto" else None
+    if own is None and not named:
+        why = f"it has no triangles, or edges too long for points {apart * dense.frame.scale:.3g} apart"
+        raise InvalidParameterError(f"mesh: {why}: remesh it, as by MeshLab's 'Isotropic Explicit Remeshing'")
+    if own is not None:
+        return own
+    through = dense.positions, outward_normals(dense.positions, dense.normals[dense.survivors], dense.rings)
+    return ball_pivoting(*through) if mesh == "ball_pivoting" else poisson(*through, apart)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,8 @@ class Layer:
     """Vertices with what hangs on them, (N, ...) arrays: MeshLab calls the scalars quality.
 
     Scalars are the radii of a skeleton, or the branches of a segmented cloud. Colours are red, green, blue and alpha
-    from 0 to 1. `skeleton` is what the vertices and edges show, and `source` the layer that it was made from.
+    from 0 to 1. `skeleton` is what the vertices and edges show, `source` the layer that it was made from, and `told`
+    what the filter said.
     """
 
     vertices: np.ndarray
@@ -41,6 +43,7 @@ class Layer:
     label: str = "cloud"
     skeleton: Skeleton | None = None
     source: Layer | None = None
+    told: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def of(cls, data: Any, label: str = "cloud", source: Layer | None = None) -> Layer:
@@ -106,7 +109,7 @@ class Layer:
 
     def summary(self) -> dict[str, Any]:
         """The layer in a few numbers, as MeshLab's filters return them."""
-        found: dict[str, Any] = {"vertices": len(self.vertices)}
+        found: dict[str, Any] = {"vertices": len(self.vertices), **self.told}
         skeleton = self.skeleton
         if skeleton is not None:
             found |= {"edges": len(skeleton.edges), "components": skeleton.n_components, "loops": skeleton.n_loops}
@@ -114,7 +117,7 @@ class Layer:
             report = skeleton.report
             found |= {"iterations": len(report.iterations), "converged": report.converged}
             found |= {"stop_reason": report.stop_reason, "warnings": list(report.warnings)}
-        elif self.colors is not None and self.scalars is not None:
+        elif self.colors is not None and self.scalars is not None and not self.told:
             found["branches"] = int(self.scalars.max(initial=-1)) + 1
         return found
 

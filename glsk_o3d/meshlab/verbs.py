@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 
 from ..analysis.segmentation import segment
+from ..crosscheck import cross_check
+from ..crosscheck.check import MADE_BY
 from ..errors import InvalidParameterError, did_you_mean
 from ..io.colors import shades
 from ..parameters import Parameters, parameter, problem_with, resolve_length, shown
@@ -174,19 +176,36 @@ class SegmentVerb(Verb):
         )
 
 
+@dataclass(frozen=True)
+class CrossCheckVerb(Verb):
+    """Points with the angle between both Laplacians, and a verdict on their skeleton."""
+
+    def run(self, layer: Layer, given: Mapping[str, Any], on_iteration: Callable[..., Any] | None = None) -> Layer:
+        check = cross_check(layer.cloud(), pipeline=self.plan(given), mesh=given.get("mesh", "auto"))
+        told = {"verdict": check.verdict, "probability": check.probability, "because": check.reasons}
+        return dataclasses.replace(self.shown(check.points, layer), scalars=check.angle, told=told)
+
+
 @cache
 def verbs() -> dict[str, Verb]:
-    """Our filters for MeshLab by their names in Python: the pipelines, and the segmentation."""
+    """Our filters for MeshLab by their names in Python: the pipelines, the segmentation, and the cross-check."""
     whole = "The curve skeleton of the current layer's vertices, with radii as scalars."
     segmented = (
         "The points that a skeleton was made from, with the branch that each belongs to as scalar and as colour. "
         "On a layer without skeleton the default pipeline makes one first. Faces are kept."
     )
+    checked = (
+        "Whether the skeleton of the current layer agrees with that of a mesh by libigl's Laplacian: a verdict, and "
+        "the points with the angle between both Laplacians in degrees as scalar."
+    )
+    mesh = Slot("mesh", parameter("auto", "What the mesh is made by.", type="choice", choices=MADE_BY).metadata)
     layer = Slot("layer", parameter(None, "The layer to act on; -1 is the current one.", type="int", low=-1).metadata)
     slots = {slot.name: slot for slot in (*_slots_of_all(), layer)}
+    of_check = {"pipeline": slots["pipeline"], "mesh": mesh, "layer": layer}
     found = [
         Verb("generate_curve_skeleton_glsk", whole, slots, "a skeleton"),
         SegmentVerb("generate_segmented_cloud_glsk", segmented, {"layer": layer}, "points or a mesh"),
+        CrossCheckVerb("get_curve_skeleton_crosscheck_glsk", checked, of_check, "points"),
     ]
     return {verb.name: verb for verb in found}
 

@@ -68,13 +68,19 @@ def inscribed_balls(points: np.ndarray, outward: np.ndarray) -> tuple[Floats, Fl
 
 
 def medial_places(points: np.ndarray, normals: np.ndarray, rings: Rings) -> tuple[Floats, Floats]:
-    """A place on the medial axis for each point, (n, 3), and how far it is to be believed, (n,), from 0 to 1.
-
-    It is the mean of the centres of the inscribed balls over two rings. Each weighs by the squared distance of its
-    contacts over that of its diameter, which is what they say of its centre: 1 of two walls, 0 of a single flat face.
-    """
+    """A place on the medial axis for each point, (n, 3), and how far it is to be believed, (n,), from 0 to 1."""
     outward = outward_normals(points, normals, rings)
-    radius, apart = inscribed_balls(points, outward)
+    return mean_places(points, outward, rings, *inscribed_balls(points, outward))
+
+
+def mean_places(
+    points: np.ndarray, outward: np.ndarray, rings: Rings, radius: np.ndarray, apart: np.ndarray
+) -> tuple[Floats, Floats]:
+    """What inscribed balls say of the medial axis, as places (n, 3) and trust (n,): means of centres over two rings.
+
+    Each weighs by the squared distance of its contacts over that of its diameter, which is what they say of its centre:
+    1 of two walls, 0 of a single flat face.
+    """
     trust = apart[:, None] ** 2
     sums = np.column_stack([trust * (points - radius[:, None] * outward), trust])
     for _ in range(2):

@@ -75,6 +75,11 @@ def nearest_moved(points: np.ndarray, neighbours: np.ndarray, moved: np.ndarray)
     return found
 
 
+def spacing(points: np.ndarray) -> float:
+    """Mean distance of points (n, 3) to six neighbours, as many as a regular triangulation gives each."""
+    return float(nearest_neighbours(points, min(7, len(points)))[0][:, 1:].mean())
+
+
 def local_outlier_ratio(mean: Floats, neighbours: np.ndarray) -> np.ndarray:
     """Mean distance of every point to its neighbours over that of the neighbours to theirs (Breunig et al. 2000, LOF).
 

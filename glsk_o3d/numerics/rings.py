@@ -10,6 +10,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from .delaunay_star import delaunay_star
+from .vectors import dot
 
 STAR_CHUNK = 1536  # speed: rows at a time: the (rows, k) work arrays then stay in the cache
 
@@ -96,6 +97,20 @@ class Rings:
     def _adjacency(self) -> csr_array:
         return csr_array((np.ones(len(self.indices)), self.indices, self.indptr), shape=(len(self),) * 2)
 
+    def folded(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """Closed rings that, seen along the normals (n, 3), do not turn once around their point, (n,) bool array.
+
+        From one neighbour to the next the angle grows, from 0 to a whole turn; these add up to one turn, or, seen from
+        below, to all turns but one.
+        """
+        across = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
+        way, up = points[self.indices] - points[self.centres], np.cross(normals, across)
+        around = np.arctan2(dot(way, up[self.centres]), dot(way, across[self.centres]))
+        entry, after = self.fans
+        turn = (around[after] - around[entry]) % (2 * np.pi)
+        turns = np.rint(np.bincount(self.centres[entry], turn, len(self)) / (2 * np.pi))
+        return self.closed & (turns != 1) & (turns != self.sizes - 1)
+
     def take(self, points: np.ndarray) -> Rings:
         """The rings of some points, in the order given; the indices stay as they are."""
         sizes = self.sizes[points]
@@ -131,6 +146,19 @@ class Rings:
         rows = np.full(present.shape, -1)
         rows[present] = rings.indices
         return rows
+
+    @classmethod
+    def of_faces(cls, n: int, faces: np.ndarray) -> Rings:
+        """The neighbours of n vertices in a mesh (f, 3), each of which has a face; closed where there is no border.
+
+        They are ascending, not in rotational order, since in a mesh that is no manifold there is none.
+        """
+        sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        edges, count = np.unique(sides, axis=0, return_counts=True)
+        centre, neighbour = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0).T
+        closed = np.ones(n, bool)
+        closed[edges[count == 1]] = False
+        return cls(np.searchsorted(centre, np.arange(n + 1)), neighbour, closed)
 
     @classmethod
     def from_padded(cls, ring: np.ndarray, closed: np.ndarray) -> Rings:

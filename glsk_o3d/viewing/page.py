@@ -5,7 +5,7 @@ import hashlib
 import json
 import os
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime, timezone
 from importlib.resources import files
 from itertools import zip_longest
@@ -29,7 +29,13 @@ FLAT_SIDE = 0.85  # a box whose least side is less than this share of the next i
 MOST_LISTED_ROWS = 12  # of a table
 
 
-def save_report(skeleton: Skeleton, path: str | os.PathLike[str], *, title: str = "Curve skeleton") -> None:
+def save_report(
+    skeleton: Skeleton,
+    path: str | os.PathLike[str],
+    *,
+    title: str = "Curve skeleton",
+    facts: Mapping[str, Mapping[str, str]] | None = None,
+) -> None:
     """Write a page that shows a skeleton and the run that made it.
 
     The page is one HTML file that works offline in any browser with WebGL 2: cloud, skeleton and radius tubes to turn
@@ -43,6 +49,8 @@ def save_report(skeleton: Skeleton, path: str | os.PathLike[str], *, title: str 
         HTML; it appears complete or not at all.
     title : str
         Shown literally.
+    facts : dict of str to dict of str to str, optional
+        More sections: a table of names and texts below each heading, such as the numbers of a cross-check.
 
     Raises
     ------
@@ -56,11 +64,11 @@ def save_report(skeleton: Skeleton, path: str | os.PathLike[str], *, title: str 
     >>> glsk.save_report(glsk.skeletonize(torus(600).points), "report.html", title="A torus")  # doctest: +SKIP
     """
     check_ending(path, "report is a page", ".html", ".htm")
-    page = _page(skeleton.whole, title).encode("utf-8", "replace")  # a file name may be no Unicode
+    page = _page(skeleton.whole, title, facts or {}).encode("utf-8", "replace")  # a file name may be no Unicode
     write_atomically(path, lambda temporary: temporary.write_bytes(page))
 
 
-def _page(skeleton: Skeleton, title: str) -> str:
+def _page(skeleton: Skeleton, title: str, facts: Mapping[str, Mapping[str, str]]) -> str:
     shown = thinned(skeleton.points, MOST_DRAWN_POINTS)
     finite = np.isfinite(skeleton.points).all(axis=1).sum()
     assets = files(__package__) / "assets"
@@ -69,7 +77,10 @@ def _page(skeleton: Skeleton, title: str) -> str:
     report, kind = skeleton.report, "Curve skeleton" if len(skeleton.vertices) else "Point cloud"
     now = datetime.now(timezone.utc).strftime("%d %B %Y, %H:%M UTC")
     thinning = f"The view shows {len(shown):,} of {finite:,} points, drawn at random."
-    below = [contraction(report), topology(report), support(report), origin(report)]
+    more = [
+        markup("<h2>{}</h2>{}", head, _table(("fact", "value"), list(told.items()))) for head, told in facts.items()
+    ]
+    below = [*more, contraction(report), topology(report), support(report), origin(report)]
     return markup(
         html,
         title=title,

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..analysis.summary import point_count, structure
+from ..errors import InvalidParameterError
 from ..interop.atomic import check_ending
 from ..numerics.vectors import norm
 from ..report import Report
@@ -14,11 +15,11 @@ from ..skeleton import Skeleton
 from . import figures
 from .figures import INK, PAPER
 
-_RED, _AMBER = "#d0121f", "#a05000"
+_RED, _BLUE, _AMBER = "#d0121f", "#1f5fbf", "#a05000"
 _LINE_HEIGHT, _LETTER_WIDTH, _MOST_LINES, _MOST_WARNINGS = 0.16, 0.066, 2, 2  # inches; lines of each warning, warnings
 _TITLE_SIZE = 1.5  # over the size of the other letters
-_FAR_DOT, _NEAR_DOT = np.array([0.89] * 3), np.array([0.64] * 3)
-ROOT_MARK = {"marker": "D", "s": 22, "facecolors": "#1f5fbf", "edgecolors": "white", "linewidths": 0.6, "label": "root"}
+_FAR_DOT, _NEAR_DOT, _AMBER_DOT = np.array([0.89] * 3), np.array([0.64] * 3), np.array([0.93, 0.6, 0.15])
+ROOT_MARK = {"marker": "D", "s": 22, "facecolors": _BLUE, "edgecolors": "white", "linewidths": 0.6, "label": "root"}
 """How the place is drawn that a tree grows from."""
 
 # Fitted to the eye: the cloud's dots as a share of the area of a view, and each in square points at least and at most;
@@ -29,7 +30,14 @@ _DOT_SHARE, _WIDEST_DOT, _LONE_DOT = 0.12, 3.0, 3.7
 _MOST_MARKS = 12  # of what samples disagree with
 
 
-def save_preview(skeleton: Skeleton, path: str | os.PathLike[str], *, title: str | None = None) -> None:
+def save_preview(
+    skeleton: Skeleton,
+    path: str | os.PathLike[str],
+    *,
+    title: str | None = None,
+    beside: Skeleton | None = None,
+    marked: np.ndarray | None = None,
+) -> None:
     """Draw a skeleton and its cloud from three sides into a PNG file.
 
     The three views look along the coordinate axes, all at the scale of the bar above them: x across and z up, y across
@@ -46,11 +54,16 @@ def save_preview(skeleton: Skeleton, path: str | os.PathLike[str], *, title: str
         PNG; it appears complete or not at all.
     title : str, optional
         Above the views.
+    beside : Skeleton, optional
+        Another one of the same object, as of a cross-check: drawn in blue below the first.
+    marked : (N,) bool array, optional
+        Points of the skeleton's cloud that are amber.
 
     Raises
     ------
-    FileFormatError, MissingPackageError, OSError
-        The ending is not ``.png``, matplotlib is not installed, or the file cannot be written.
+    InvalidParameterError, FileFormatError, MissingPackageError, OSError
+        `marked` has not a value for each point, the ending is not ``.png``, matplotlib is not installed, or the file
+        cannot be written.
 
     Examples
     --------
@@ -61,13 +74,20 @@ def save_preview(skeleton: Skeleton, path: str | os.PathLike[str], *, title: str
     ...     save_preview(skeletonize(torus(1000).points), f"{folder}/ring.png")
     """
     check_ending(path, "preview is a picture", ".png")
-    figures.save_figure(draw(skeleton, title), path)
+    figures.save_figure(draw(skeleton, title, beside, marked), path)
 
 
-def draw(skeleton: Skeleton, title: str | None = None) -> Any:
+def draw(
+    skeleton: Skeleton, title: str | None = None, beside: Skeleton | None = None, marked: np.ndarray | None = None
+) -> Any:
     """The figure, not yet in a file."""
-    cloud = skeleton.whole.points[figures.thinned(skeleton.whole.points, figures.MOST_DRAWN_POINTS)]
-    centre, extent = figures.room(np.concatenate([cloud, skeleton.vertices]))
+    points = skeleton.whole.points
+    if marked is not None and np.shape(marked) != (len(points),):
+        raise InvalidParameterError(f"marked: {len(points)} points need as many values, not {np.shape(marked)}")
+    shown = figures.thinned(points, figures.MOST_DRAWN_POINTS)
+    cloud, amber = points[shown], np.zeros(len(shown), bool) if marked is None else np.asarray(marked, bool)[shown]
+    vertices = [each.vertices for each in (skeleton, beside) if each is not None]
+    centre, extent = figures.room(np.concatenate([cloud, *vertices]))
     head, foot, report = 0.58 if title else 0.25, 0.34, skeleton.report
     room = _LINE_HEIGHT * (_MOST_LINES * _MOST_WARNINGS + 1) if report.warnings else 0
     figure = figures.new_figure(figures.fitting_size(extent, head=head, foot=foot + room))
@@ -82,8 +102,10 @@ def draw(skeleton: Skeleton, title: str | None = None) -> Any:
     foot += _LINE_HEIGHT * (len(counted) - 1)
     for a, b, axes in figures.three_views(figure, extent, head=head, foot=foot + below):
         scale = 72 * axes.get_position().width * width / extent[a]  # points per unit
-        _draw_cloud(axes, cloud - centre, a, b, scale**2 * np.prod(np.sort(extent)[1:]))
-        _draw_curve(axes, skeleton, skeleton.vertices - centre, [a, b], scale)
+        _draw_cloud(axes, cloud - centre, amber, a, b, scale**2 * np.prod(np.sort(extent)[1:]))
+        if beside is not None:
+            _draw_curve(axes, beside, beside.vertices - centre, [a, b], scale, _BLUE)
+        _draw_curve(axes, skeleton, skeleton.vertices - centre, [a, b], scale, _RED)
         _mark_doubts(axes, report, centre, [a, b])
         if report.root:
             axes.scatter(*np.subtract(report.root, centre)[[a, b]], **ROOT_MARK, zorder=4, clip_on=False)
@@ -104,16 +126,19 @@ def counts(skeleton: Skeleton) -> dict[str, str]:
     return {name: f"{value:.4g}" if name == "length" else f"{value:,}" for name, value in facts.items()}
 
 
-def _draw_cloud(axes: Any, cloud: np.ndarray, a: int, b: int, area: float) -> None:
-    """Grey dots, lighter where they are farther; smaller the more are in the area [points^2]."""
+def _draw_cloud(axes: Any, cloud: np.ndarray, amber: np.ndarray, a: int, b: int, area: float) -> None:
+    """Grey dots, lighter where they are farther, some of them amber; smaller the more are in the area [points^2]."""
     depth, toward = cloud[:, 3 - a - b], 1 if (a, b) != (0, 2) else -1  # x, y, z are right-handed
     order = np.argsort(toward * depth, kind="stable")
     near = (np.arange(len(order)) / max(len(order) - 1, 1))[:, None]
     style = {"linewidths": 0, "clip_on": False, "s": np.clip(_DOTS_SHARE * area / max(len(cloud), 1), *_DOT_AREA)}
-    axes.scatter(cloud[order, a], cloud[order, b], c=_FAR_DOT + near * (_NEAR_DOT - _FAR_DOT), **style)
+    color = np.where(amber[order, None], _AMBER_DOT, _FAR_DOT + near * (_NEAR_DOT - _FAR_DOT))
+    axes.scatter(cloud[order, a], cloud[order, b], c=color, **style)
 
 
-def _draw_curve(axes: Any, skeleton: Skeleton, vertices: np.ndarray, across_up: list[int], scale: float) -> None:
+def _draw_curve(
+    axes: Any, skeleton: Skeleton, vertices: np.ndarray, across_up: list[int], scale: float, color: str
+) -> None:
     """Edges, and junctions and leaves where branches are long enough for dots on them; the scale is points per unit."""
     from matplotlib.collections import LineCollection
 
@@ -121,13 +146,13 @@ def _draw_curve(axes: Any, skeleton: Skeleton, vertices: np.ndarray, across_up: 
     branch = scale * float(np.median(lengths)) if lengths else 0.0
     line = float(np.clip(_LINE_SHARE * branch, *_LINE_WIDTH))
     segments = vertices[skeleton.edges][:, :, across_up]
-    axes.add_collection(LineCollection(segments, colors=_RED, linewidths=line, capstyle="round", clip_on=False))
+    axes.add_collection(LineCollection(segments, colors=color, linewidths=line, capstyle="round", clip_on=False))
     dot = min(_DOT_SHARE * branch, _WIDEST_DOT)
-    spots = [(skeleton.degree == 0, _RED, _LONE_DOT)]
+    spots = [(skeleton.degree == 0, color, _LONE_DOT)]
     if dot > line:
         spots += [(skeleton.degree == 1, PAPER, dot), (skeleton.degree > 2, INK, dot)]
     for chosen, face, wide in spots:
-        style = {"s": wide**2, "facecolors": face, "edgecolors": _RED if face == PAPER else face}
+        style = {"s": wide**2, "facecolors": face, "edgecolors": color if face == PAPER else face}
         axes.scatter(*vertices[chosen][:, across_up].T, zorder=3, clip_on=False, linewidths=0.3 * wide, **style)
 
 

@@ -43,13 +43,13 @@ def test_a_script_of_ours_is_the_pipeline(invoke, scans, script, tmp_path):
     np.testing.assert_array_equal(read_skeleton(tmp_path / "s.ply").edges, expected.edges)
 
 
-def test_the_cross_check_measures_and_writes_nothing(invoke, scans, tmp_path):
+def test_the_cross_check_gives_its_verdict_and_writes_nothing(invoke, scans, tmp_path):
     result = invoke("run", "mesh_crosscheck", scans / "ring.ply", "--json")
     assert result.exit_code == 0, result.stderr
-    steps = json.loads(result.stdout)["steps"]
-    assert [steps[i]["result"]["loops"] for i in (2, 3)] == [1, 1]
-    diagonal = np.linalg.norm([1.0, 1.0, 0.2])
-    assert all(0 < step["result"]["mean"] < 0.03 * diagonal for step in steps[4:])
+    made, checked = (step["result"] for step in json.loads(result.stdout)["steps"])
+    assert made["loops"] == 1
+    assert (checked["verdict"], checked["because"]) == ("agrees", [])
+    assert checked["probability"] > 0.9
     assert not list(tmp_path.iterdir())
 
 

@@ -1,11 +1,18 @@
-"""Meshes and clouds with known one-rings, and the check of a torus."""
+"""Surfaces with known meshes, and the checks of a torus and of a shape with limbs."""
+
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from glsk_o3d import samples
+from glsk_o3d import Denoiser, OutlierRemover, RingBuilder, Sampler, Thinner, samples
+from glsk_o3d.analysis.agreement import compare_skeletons
 from glsk_o3d.crosscheck import cross_check
+from glsk_o3d.crosscheck.agreement import judge
+from glsk_o3d.crosscheck.operators import compare_operators, mesh_operator
+from glsk_o3d.crosscheck.solid import Solid
+from glsk_o3d.numerics.operators import ring_operator
 
 
 @pytest.fixture(scope="session")
@@ -27,7 +34,7 @@ def even_ball():
 
 @pytest.fixture(scope="session")
 def ring():
-    ring = samples.torus(1500)
+    ring = samples.torus(2000)
     ring.points.flags.writeable = False  # the input is not changed
     return ring
 
@@ -38,12 +45,31 @@ def check(ring):
 
 
 @pytest.fixture(scope="session")
-def grid():
-    """Faces of a grid of n by m vertices, closed in either direction or not."""
+def limbs():
+    """Points of a body with a neck, a tail, legs and a loop."""
+    return samples.sauropod(4096).points
 
-    def make(n, m, close_n, close_m):
-        i, j = (a.ravel() for a in np.mgrid[: n - 1 + close_n, : m - 1 + close_m])
-        corners = [(i + a) % n * m + (j + b) % m for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
-        return np.concatenate([np.column_stack([corners[k] for k in which]) for which in ((0, 1, 2), (0, 2, 3))])
 
-    return make
+@pytest.fixture(scope="session")
+def bench(limbs):
+    """A clean shape on the bench: everything that is compared, any of which can be broken by name before `judged`."""
+    check = cross_check(limbs)
+    points = (Sampler() | OutlierRemover() | Denoiser() | Thinner())(limbs)
+    state = RingBuilder()(points)
+    body = Solid(state.frame.into(check.solid.vertices), check.solid.faces, "given")
+    parts = SimpleNamespace(
+        check=check,
+        rings=state.rings,
+        ours=ring_operator(state.positions, state.rings),
+        theirs=mesh_operator(body),
+        skeleton=check.skeleton,
+    )
+
+    def judged(**broken):
+        now = SimpleNamespace(**(vars(parts) | broken))
+        _, rows = compare_operators(now.ours, now.rings, points.ring_normals, now.theirs, body)
+        skeletons = compare_skeletons(now.skeleton, check.mesh_skeleton, 0.002 * state.frame.diagonal)
+        return judge(rows, skeletons, check.solid, check.mesh, check.mesh_skeleton.report.stop_reason)
+
+    parts.judged = judged
+    return parts

@@ -1,18 +1,17 @@
-"""Meshes of clouds: their reconstruction, libigl's Laplacian in our convention, contraction."""
+"""libigl's Laplacian in our convention, and the skeletons of meshes."""
 
 from dataclasses import replace
 
 import igl
 import numpy as np
 import pytest
-from scipy.spatial import ConvexHull, cKDTree
+from scipy.spatial import ConvexHull
 
 from glsk_o3d import Contractor, RingBuilder, Sampler, pipelines
-from glsk_o3d.crosscheck.mesh import ball_pivoting, mesh_laplacian, mesh_skeleton, mesh_state, orient_normals, umbrellas
+from glsk_o3d.crosscheck.mesh import mesh_laplacian, mesh_skeleton, mesh_state
+from glsk_o3d.crosscheck.solid import Solid
 from glsk_o3d.numerics.cotangent import WEIGHT_CAP, cotangent_laplacian
-from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
 from glsk_o3d.numerics.rings import Rings
-from glsk_o3d.samples import sphere, torus, tube, two_rings
 
 
 def convex_rings(points, faces):
@@ -29,30 +28,6 @@ def convex_rings(points, faces):
         x, y = axes @ (points[names] - points[i]).T
         rows.append(names[np.argsort(np.arctan2(y, x))])
     return Rings(np.cumsum([0, *map(len, rows)]), np.concatenate(rows), np.ones(len(rows), bool))
-
-
-def meshed(points):
-    """The state of a cloud, and the faces of a mesh of it."""
-    state = RingBuilder()(points)
-    return state, ball_pivoting(state)
-
-
-# -------------------------------------------------------------------------------------------------- reconstruction
-
-
-def test_ball_pivoting_closes_what_is_closed_and_leaves_open_ends_open(even_ball):
-    _, faces = meshed(even_ball(1000)[0])
-    assert umbrellas(1000, faces).all()
-    assert igl.euler_characteristic(faces) == 2
-    state, faces = meshed(tube(3000, capped=False).points)
-    border = ~umbrellas(3000, faces)
-    ends = np.abs(state.frame.out_of(state.cloud)[:, 0]) > 0.48
-    assert border[ends].mean() > 5 * border[~ends].mean()
-
-
-def test_the_same_twice():
-    points = torus(600, noise=0.01).points
-    np.testing.assert_array_equal(meshed(points)[1], meshed(points)[1])
 
 
 # ------------------------------------------------------------------------------------------------- sign and factor
@@ -82,8 +57,9 @@ def test_the_sign(even_ball):
 
 def test_it_is_the_gradient_of_the_area():
     # x . L x = -4 area of any mesh, torn or not manifold
-    state, faces = meshed(torus(1500, noise=0.02).points)
-    points = state.cloud
+    rng = np.random.default_rng(0)
+    points, faces = rng.normal(size=(300, 3)), rng.integers(0, 300, (500, 3))
+    faces = faces[(np.diff(np.sort(faces, axis=1)) > 0).all(axis=1)]
     area = igl.doublearea(points, faces).sum() / 2
     found = (points * (mesh_laplacian(points, faces, cap=1e300) @ points)).sum()
     assert found == pytest.approx(-4 * area, rel=1e-9)
@@ -108,47 +84,52 @@ def test_triangles_without_area_and_bare_vertices_add_nothing():
 # ----------------------------------------------------------------------------------------------------- contraction
 
 
-def test_it_is_the_contractor_where_rings_and_one_rings_are_the_same():
-    rng = np.random.default_rng(3)
-    points = rng.normal(size=(400, 3))
+def ellipsoid(n=400):
+    points = np.random.default_rng(3).normal(size=(n, 3))
     points *= [[1, 0.6, 2.5]] / np.linalg.norm(points, axis=1, keepdims=True)
-    state = RingBuilder()(points)
-    faces = ConvexHull(state.cloud).simplices.astype(np.int64)
-    begun, faces = mesh_state(state, faces)
-    centred = state.cloud - state.cloud.mean(axis=0)
-    rings = convex_rings(centred, faces)
+    hull = ConvexHull(points)
+    outward = np.einsum(
+        "ij,ij->i", np.cross(*np.diff(points[hull.simplices], axis=1).swapaxes(0, 1)), hull.equations[:, :3]
+    )
+    faces = np.where(outward[:, None] < 0, hull.simplices[:, ::-1], hull.simplices)
+    return Solid(points, faces.astype(np.int64), "given")
+
+
+def test_it_is_the_contractor_where_rings_and_one_rings_are_the_same():
+    begun, faces = mesh_state(ellipsoid())
+    rings = convex_rings(begun.cloud - begun.cloud.mean(axis=0), faces)
     contractor = Contractor(max_iterations=3, stop=lambda iterations: None)
     ours = contractor(replace(begun, rings=rings))
     theirs = contractor.contract(begun, lambda state: mesh_laplacian(state.positions, faces))
     assert len(theirs.report.iterations) == len(ours.report.iterations) == 3
     assert len(theirs) == len(ours) == 400
     np.testing.assert_allclose(theirs.positions, ours.positions, atol=1e-5)
-    assert theirs.report.stages == begun.report.stages == ()
 
 
-def test_points_without_a_triangle_go_to_the_nearest_with_one():
-    state, faces = meshed(tube(1500).points)
-    gone = np.flatnonzero(state.cloud[:, 0] > 0.3)
-    faces = faces[~np.isin(faces, gone).any(axis=1)]
-    begun, local = mesh_state(state, faces)
-    assert len(begun) == len(np.unique(faces)) < len(state)
-    np.testing.assert_array_equal(begun.survivors[local], faces)
-    np.testing.assert_array_equal(begun.representative[begun.survivors], np.arange(len(begun)))
-    assert (begun.cloud[begun.survivors[begun.representative[gone]], 0] > 0.2).all()
-    skeleton = mesh_skeleton(state, faces, pipelines.default())
-    assert (skeleton.vertex_of_point >= 0).all()
-    assert skeleton.n_components == 1
+def test_it_starts_from_medial_places():
+    solid = ellipsoid(1500)
+    begun, _ = mesh_state(solid)
+    place = begun.frame.out_of(begun.positions) / [1, 0.6, 2.5]
+    middle = np.abs(place[:, 2]) < 0.5
+    assert np.median(np.linalg.norm(place[middle], axis=1)) < 0.75  # the surface is at 1
+    area = igl.massmatrix(solid.vertices, solid.faces).diagonal()
+    mass = begun.mass[begun.representative_of_point]
+    np.testing.assert_allclose(mass, np.maximum(area / area.mean(), 0.05), rtol=1e-9)
 
 
-# ------------------------------------------------------------------------------------------------------ orientation
+def test_vertices_that_fall_together_keep_the_mesh_whole():
+    solid = ellipsoid()
+    twice = np.vstack([solid.vertices, solid.vertices[:200] + 1e-12])
+    faces = np.where(
+        (solid.faces < 200) & (np.arange(len(solid.faces)) % 2 == 0)[:, None], solid.faces + 400, solid.faces
+    )
+    begun, over = mesh_state(Solid(twice, faces, "given"))
+    assert len(begun) == 400
+    assert igl.euler_characteristic(over) == 2
 
 
-@pytest.mark.parametrize("shape", [sphere, torus, two_rings])
-def test_normals_of_closed_surfaces_point_outward(shape):
-    sample = shape(3000)
-    outward = sample.points - sample.nodes[cKDTree(sample.nodes).query(sample.points)[1]]
-    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
-    mixed = outward * np.random.default_rng(0).choice([-1, 1], (len(outward), 1))
-    neighbours = nearest_neighbours(sample.points, 8)[1]
-    edges = np.column_stack([np.repeat(np.arange(3000), 7), neighbours[:, 1:].ravel()])
-    np.testing.assert_array_equal(orient_normals(sample.points, mixed, edges), outward)
+def test_the_skeleton_of_an_ellipsoid():
+    skeleton = mesh_skeleton(ellipsoid(1500), pipelines.default())
+    assert (skeleton.n_components, skeleton.n_loops) == (1, 0)
+    assert np.abs(skeleton.vertices[:, :2]).max() < 0.2
+    assert skeleton.length > 2

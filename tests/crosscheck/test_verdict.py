@@ -4,62 +4,98 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from glsk_o3d.crosscheck import agreement
-from glsk_o3d.crosscheck.agreement import RowAgreement, SkeletonAgreement
-from glsk_o3d.report import REFUSED, Report
+from glsk_o3d.analysis.agreement import SkeletonAgreement
+from glsk_o3d.cli.crosscheck import MEANINGS
+from glsk_o3d.crosscheck.agreement import VERDICTS, MeshFacts, judge
+from glsk_o3d.crosscheck.operators import OperatorAgreement
+from glsk_o3d.crosscheck.solid import Solid
+from glsk_o3d.report import REFUSED
 
-SETTLED = Report(stop_reason="settled")
-FAILED = Report(stop_reason=f"solve 3 {REFUSED}: it broke", warnings=("spiky", "flat"))
+SAME = OperatorAgreement(900, 900, 9, {"median": 3.0}, {"median": 1.0}, 0.1, np.ones((50, 2)), 1.0, 0)
+ALIKE = SkeletonAgreement(0.05, 0.1, (1, 1), (2, 2), (3, 3), (), (), 0.01, (1.0, 2.0, 3.0))
+AWAY = ((1.0, 2.0, 3.0),)
 
 
-def rows(**changed):
-    return replace(RowAgreement(90, 90, 1.0, {"median": 1.0, "p75": 2.0}), **changed)
+class Body(Solid):
+    """A solid of which the parts are said."""
+
+    def __init__(self, solids=1, genus=2, watertight=True, made_by="poisson"):
+        super().__init__(np.zeros((0, 3)), np.zeros((0, 3), int), made_by)
+        self.__dict__.update(said=(solids, genus, watertight))
+
+    n_solids = property(lambda self: self.said[0])
+    genus = property(lambda self: self.said[1])
+    is_watertight = property(lambda self: self.said[2])
 
 
-def apart(**changed):
-    return replace(SkeletonAgreement(0.05, 0.1, (1, 1), (2, 2)), **changed)
+def judged(rows=(), skeletons=(), solid=(), mesh=(0.0, 0.0), stop="settled"):
+    return judge(
+        replace(SAME, **dict(rows)), replace(ALIKE, **dict(skeletons)), Body(**dict(solid)), MeshFacts(*mesh), stop
+    )
+
+
+CASES = [
+    ("agrees", {}, None),
+    ("do not trust", {"rows": {"angle": {"median": 61.0}}}, "turned by more than 61 degrees"),
+    ("agrees", {"rows": {"angle": {"median": 59.0}}}, None),
+    ("agrees", {"rows": {"angle": {}}}, None),  # all is flat
+    ("do not trust", {"rows": {"eigenvalue_ratio": 0.66}}, "0.66 times those of the mesh's"),
+    ("agrees", {"rows": {"eigenvalue_ratio": 1.49}}, None),
+    ("do not trust", {"rows": {"eigenvalue_ratio": np.nan}}, "nan times"),
+    ("do not trust", {"rows": {"folded": 1}}, "1 rings do not go once around"),
+    ("do not trust", {"solid": {"genus": 3}}, "loops: 2 in the skeleton, 3 in the mesh"),
+    ("do not trust", {"solid": {"solids": 2}}, "components: 1 in the skeleton, 2 in the mesh"),
+    ("agrees in part", {"skeletons": {"missing": AWAY}}, "the mesh's skeleton ends at (1, 2, 3), the cloud's does not"),
+    ("agrees in part", {"skeletons": {"extra": AWAY}}, "the skeleton ends at (1, 2, 3), the mesh's does not"),
+    ("agrees in part", {"skeletons": {"doubt": 0.75}}, "the branch at (1, 2, 3) is a limb is a close call"),
+    ("do not trust", {"skeletons": {"doubt": 1.3}}, "the branch at (1, 2, 3) is a limb is a close call"),
+]
+
+
+@pytest.mark.parametrize(("verdict", "changes", "reason"), CASES)
+def test_what_is_said_of_each_difference(verdict, changes, reason):
+    found, probability, reasons = judged(**changes)
+    assert found == verdict
+    assert [reason in text for text in reasons] == ([] if reason is None else [True])
+    assert (probability >= 0.9) == (
+        found == "agrees" or bool(changes.get("skeletons", {}).keys() & {"missing", "extra"})
+    )
 
 
 @pytest.mark.parametrize(
-    ("verdict", "of_rows", "of_skeletons", "reason"),
+    ("fault", "reason"),
     [
-        ("agrees", {}, {}, None),
-        ("agrees in part", {"angle": {"median": 1.0, "p75": 31.0}}, {}, "turned by more than 31 degrees"),
-        ("agrees in part", {"covered": 0.69}, {}, "closes around 69%"),
-        ("cannot tell", {"compared": 0, "covered": 0.0, "angle": {}}, {}, "closes around 0%"),
-        ("agrees", {"angle": {"median": 1.0, "p75": 29.0}, "covered": 0.71}, {}, None),
-        ("agrees", {}, {"distance_in_radii": 0.19, "hausdorff95_in_radii": 0.95}, None),
-        ("agrees in part", {}, {"distance_in_radii": 0.21}, "0.21 local radii apart"),
-        ("agrees in part", {}, {"distance_in_radii": 0.49}, "0.49 local radii apart"),
-        ("agrees in part", {}, {"hausdorff95_in_radii": 1.2}, "1.2 local radii"),
-        ("do not trust", {}, {"distance_in_radii": 0.51}, "0.51 local radii apart"),
-        ("do not trust", {}, {"loops": (2, 1)}, "loops: 2 in the skeleton of the cloud, 1 in that of the mesh"),
-        ("do not trust", {}, {"components": (1, 2)}, "components: 1"),
+        ({"mesh": (0.011, 0.0)}, "passes by 1% of the points"),
+        ({"mesh": (0.0, 0.13)}, "tilted at 13% of the points"),
+        ({"stop": f"solve 3 {REFUSED}: it broke"}, "contraction failed: solve 3"),
+        ({"solid": {"solids": 3, "watertight": False}}, "the mesh is in 3 parts"),
+        ({"solid": {"solids": 3, "made_by": "given"}}, "the mesh is in 3 parts"),
     ],
 )
-def test_thresholds(verdict, of_rows, of_skeletons, reason):
-    found, reasons = agreement.judge(rows(**of_rows), apart(**of_skeletons), (), SETTLED)
-    assert found == verdict
-    assert [reason in text for text in reasons] == ([] if reason is None else [True])
+def test_a_mesh_at_fault_is_named_and_says_nothing_against_the_cloud(fault, reason):
+    verdict, probability, reasons = judged(**fault, skeletons={"missing": AWAY})
+    assert verdict == "cannot tell"
+    assert reason in reasons[0]
+    assert probability == judged()[1]
 
 
-def test_a_mesh_that_fails_is_named_and_says_nothing_against_the_cloud():
-    message = f"the mesh's own contraction failed: solve 3 {REFUSED}: it broke"
-    warned = ("the mesh's run warns: spiky", "the mesh's run warns: flat")
-    assert agreement.judge(rows(), apart(), (), FAILED) == ("agrees in part", (message, *warned))
-    verdict, reasons = agreement.judge(rows(), apart(components=(1, 9)), ("flat",), FAILED)
-    assert (verdict, reasons[0], len(reasons)) == ("cannot tell", message, 4)
-    verdict, (first, second) = agreement.judge(rows(covered=0.6), apart(loops=(2, 1)), (), SETTLED)
-    assert (verdict, first) == ("cannot tell", "the mesh closes around 60% of the points whose rings close")
-    assert second.startswith("loops: 2")
+def test_a_mesh_at_fault_that_agrees_all_the_same():
+    verdict, _, reasons = judged(mesh=(0.5, 0.0))
+    assert (verdict, len(reasons)) == ("agrees", 1)
+
+
+def test_the_more_doubt_the_less_probable():
+    found = [judged(skeletons={"doubt": doubt})[1] for doubt in (0, 0.1, 0.5, 1, 2)]
+    assert found == sorted(found, reverse=True)
+    assert found[0] > 0.98
 
 
 def test_what_to_expect_is_said_of_every_verdict_with_the_numbers_of_the_page():
-    assert set(agreement.MEANINGS) == set(agreement.VERDICTS)
+    assert set(MEANINGS) == set(VERDICTS)
     page = (Path(__file__).parents[2] / "docs" / "crosscheck.md").read_text("utf-8")
-    counts = re.findall(r"(\d+) / (\d+)", re.search(r"^\| all \|.*$", page, re.MULTILINE)[0])
-    for verdict, (good, all_) in zip(agreement.VERDICTS, counts, strict=True):
-        if verdict in (agreement.IN_PART, agreement.DISTRUST):
-            assert f"of {all_} test clouds {good} had a good skeleton" in agreement.MEANINGS[verdict]
+    row = re.search(r"^\| all \|.*$", page, re.MULTILINE)[0]
+    for verdict, (good, total) in zip(VERDICTS[:3], re.findall(r"(\d+) / (\d+)", row), strict=False):
+        assert f"of {total} such clouds {good} had the right graph" in MEANINGS[verdict]

@@ -1,0 +1,60 @@
+"""How two skeletons of one object agree, neither of which is known to be right."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..decisions import Place
+from ..skeleton import Skeleton
+from .comparison import TIP_REACH, matched
+from .curves import distances
+
+
+@dataclass(frozen=True)
+class SkeletonAgreement:
+    """How two skeletons of one object agree; pairs are the first's and the second's.
+
+    Attributes
+    ----------
+    distance_in_radii, hausdorff95_in_radii : float
+        To the nearest place on the other in local radii: mean of both directions, 95 % quantile of the worse one.
+    components, loops, leaves : tuple of int
+    missing, extra : tuple of (x, y, z)
+        Where limbs of the second end that the first lacks, and the other way around.
+    doubt, closest_call : float, (x, y, z) or None
+        Minus the logarithm of the certainty of the closest calls about a limb in both, and the place of the closer one.
+    """
+
+    distance_in_radii: float
+    hausdorff95_in_radii: float
+    components: tuple[int, int]
+    loops: tuple[int, int]
+    leaves: tuple[int, int]
+    missing: tuple[Place, ...]
+    extra: tuple[Place, ...]
+    doubt: float
+    closest_call: Place | None
+
+
+def compare_skeletons(ours: Skeleton, theirs: Skeleton, step: float) -> SkeletonAgreement:
+    """How two skeletons agree, by places on both that are `step` apart."""
+    both = [distances(*pair, step) for pair in ((ours, theirs), (theirs, ours))]
+    in_radii = [distance / radius for distance, radius in both]
+    ends = [each.vertices[each.leaves] for each in (ours, theirs)]
+    radii = [each.radii[each.leaves] for each in (ours, theirs)]
+    pairs = matched(*ends, TIP_REACH * np.maximum(radii[0][:, None], radii[1])) if all(map(len, ends)) else []
+    extra, missing = (np.delete(ends[i], [pair[i] for pair in pairs], axis=0).tolist() for i in (0, 1))
+    calls = [[it for it in each.report.decisions if it.about == "limb"] for each in (ours, theirs)]
+    closest = [min(each, key=lambda it: abs(it.probability - 0.5)) for each in calls if each]
+    certainty = [max(it.probability, 1 - it.probability) for it in closest]
+    return SkeletonAgreement(
+        distance_in_radii=float(np.mean([each.mean() for each in in_radii])),
+        hausdorff95_in_radii=float(max(np.percentile(each, 95) for each in in_radii)),
+        components=(ours.n_components, theirs.n_components),
+        loops=(ours.n_loops, theirs.n_loops),
+        leaves=(len(ours.leaves), len(theirs.leaves)),
+        missing=tuple(map(tuple, missing)),
+        extra=tuple(map(tuple, extra)),
+        doubt=float(np.log(np.divide(1, certainty)).sum()),
+        closest_call=closest[int(np.argmin(certainty))].place if closest else None,
+    )

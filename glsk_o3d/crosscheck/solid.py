@@ -1,0 +1,135 @@
+"""The solid whose surface a cloud is: a mesh of its own, and what it is like."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..errors import InvalidCloudError
+from ..interop.clouds import SurfaceMesh, surface_mesh, to_point_cloud
+from ..interop.packages import import_open3d, require
+from ..numerics.frame import MIN_POINTS, Frame
+from ..numerics.neighbourhoods import spacing
+
+CELL = 1.25  # measured: side of the octree's cells, in spacings: smaller ones follow noise, larger ones close holes
+FULL_DEPTH = 4  # speed: of the octree, down to which it is a full grid
+REACH = 2.5  # fitted: cells from the nearest point: what is farther away is no surface
+LEAST_PART = 0.02  # fitted: of the area of the largest: smaller ones are bubbles
+BALL_RADII = (1.0, 2.0, 4.0)  # fitted: of the rolling balls, in spacings
+LONGEST_EDGE = 3.0  # fitted: of a given mesh, in spacings, for its Laplacian to be that of the surface
+MOST_VERTICES = 50_000  # speed: of a given mesh whose edges were halved
+
+
+class Part(NamedTuple):
+    """A connected part of a mesh; `volume` is None of one with borders."""
+
+    area: float
+    volume: float | None
+    genus: int
+    borders: int
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A mesh that a cloud is checked against.
+
+    Attributes
+    ----------
+    vertices : (V, 3) float64 array
+    faces : (F, 3) int64 array
+        Anticlockwise from outside; a manifold.
+    made_by : {"poisson", "ball_pivoting", "given"}
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    made_by: str
+
+    @cached_property
+    def parts(self) -> tuple[Part, ...]:
+        """The connected parts, the largest area first."""
+        n_parts, part_of_face = require("igl").facet_components(self.faces)
+        parts = (self._part(self.faces[part_of_face == part]) for part in range(n_parts))
+        return tuple(sorted(parts, key=lambda part: -part.area))
+
+    def _part(self, faces: np.ndarray) -> Part:
+        igl = require("igl")
+        vertices, faces, *_ = igl.remove_unreferenced(self.vertices, faces)
+        area = float(igl.doublearea(vertices, faces).sum() / 2)
+        borders = len(igl.boundary_loop_all(faces))
+        corners = vertices[faces] - vertices.mean(axis=0)
+        volume = None if borders else float(np.linalg.det(corners).sum() / 6)
+        return Part(area, volume, (2 - borders - int(igl.euler_characteristic(faces))) // 2, borders)
+
+    @property
+    def is_watertight(self) -> bool:
+        """Whether no part has a border."""
+        return not any(part.borders for part in self.parts)
+
+    @property
+    def n_solids(self) -> int:
+        """Parts that are not walls of cavities, which are turned the other way than the largest."""
+        sides = [np.sign(part.volume or 0) for part in self.parts]
+        return int(np.sum(np.multiply(sides, sides[0]) >= 0))
+
+    @property
+    def genus(self) -> int:
+        """Handles of all parts: the loops that a skeleton has."""
+        return sum(part.genus for part in self.parts)
+
+    @classmethod
+    def of(cls, mesh: Any, made_by: str) -> "Solid":
+        """One of an Open3D mesh, split where it is no manifold; InvalidCloudError if there is hardly any surface."""
+        igl = require("igl")
+        mesh.remove_duplicated_triangles()
+        mesh.remove_degenerate_triangles()
+        vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.triangles, np.int64)
+        faces = faces[igl.doublearea(vertices, faces) > 0] if len(faces) else faces
+        if len(faces) < MIN_POINTS:
+            raise InvalidCloudError(f"only {len(faces)} triangles have an area: there is no surface to compare with")
+        return cls(*igl.remove_unreferenced(*igl.split_nonmanifold(vertices, faces)[:2])[:2], made_by)
+
+
+def poisson(points: np.ndarray, outward: np.ndarray, apart: float) -> Solid:
+    """A mesh through points (n, 3) with outward normals, with vertices of its own (Kazhdan and Hoppe 2013).
+
+    `apart` is the spacing that its cells go by. What is far from all points is left out, and so are small parts.
+    """
+    o3d, cloud, cell = import_open3d(), to_point_cloud(points), CELL * apart
+    cloud.normals = o3d.utility.Vector3dVector(outward)
+    asked = dict(depth=0, width=cell, full_depth=FULL_DEPTH, linear_fit=True, n_threads=1)
+    mesh, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, **asked)
+    mesh.remove_vertices_by_mask(cKDTree(points).query(np.asarray(mesh.vertices))[0] > REACH * cell)
+    part, _, area = map(np.asarray, mesh.cluster_connected_triangles())
+    mesh.remove_triangles_by_mask((area < LEAST_PART * area.max(initial=0))[part])
+    return Solid.of(mesh, "poisson")
+
+
+def ball_pivoting(points: np.ndarray, outward: np.ndarray) -> Solid:
+    """A mesh with the points (n, 3) as vertices (Bernardini et al. 1999)."""
+    o3d, cloud = import_open3d(), to_point_cloud(points)
+    cloud.normals = o3d.utility.Vector3dVector(outward)
+    radii = o3d.utility.DoubleVector(spacing(points) * np.array(BALL_RADII))
+    return Solid.of(o3d.geometry.TriangleMesh.create_from_point_cloud_ball_pivoting(cloud, radii), "ball_pivoting")
+
+
+def given(mesh: Any, frame: Frame, apart: float) -> Solid | None:
+    """A mesh of the user's in the working frame, all edges halved until none is longer than three spacings.
+
+    None if that makes too many, or if it has no triangles. InvalidCloudError if it is no mesh.
+    """
+    vertices, triangles = surface_mesh(SurfaceMesh(*mesh) if isinstance(mesh, tuple) else mesh)
+    if len(triangles) == 0:
+        return None
+    if not np.isfinite(vertices).all():
+        raise InvalidCloudError("the mesh has coordinates that are not finite")
+    o3d, igl = import_open3d(), require("igl")
+    arrays = o3d.utility.Vector3dVector(frame.into(vertices)), o3d.utility.Vector3iVector(triangles)
+    solid = Solid.of(o3d.geometry.TriangleMesh(*arrays), "given")
+    while igl.edge_lengths(solid.vertices, solid.faces).max() > LONGEST_EDGE * apart:
+        if len(solid.vertices) > MOST_VERTICES / 4:
+            return None
+        solid = Solid(*igl.upsample(solid.vertices, solid.faces, 1), "given")
+    return solid
