@@ -71,7 +71,7 @@ class RingBuilder(Filter[Contraction]):
 
     def _run(self, points: Points, watch: Watch | None) -> Contraction:
         cloud = points.cloud[points.survivors]
-        neighbours, normals = self._neighbourhoods(points, cloud)
+        neighbours, normals = self.neighbourhoods(points, cloud)
         if np.array_equal(points.ring_normals, points.normals):  # no point was moved or merged
             points = replace(points, normals=normals)
         if self.radius is not None:
@@ -90,7 +90,7 @@ class RingBuilder(Filter[Contraction]):
         known = dict(report=report, mass=mass, thinned=points.survivors)
         return Contraction(**(points.common() | known | at_rest(cloud, rings)))
 
-    def _neighbourhoods(self, points: Points, cloud: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def neighbourhoods(self, points: Points, cloud: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The neighbours of every point but itself, (n, k - 1), and the unit normals of their planes, (n, 3)."""
         known = points.neighbours.shape[1]
         k = {"auto": known, "published": published_k(len(cloud))}[self.k] if isinstance(self.k, str) else self.k

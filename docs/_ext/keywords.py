@@ -27,7 +27,7 @@ KEYWORDS = {
     "docs/comparison": "comparison, compare, other tools, pygel3d, versus, alternatives",
     "docs/benchmark": "benchmark, benchmarks, score, scores",
     "docs/evaluation": "evaluate, evaluation, measures, metrics, truth, assess",
-    "docs/crosscheck": "crosscheck, cross-check, cross check, libigl, mesh, Poisson, genus, eigenvalues, verdict, trust",
+    "docs/crosscheck": "crosscheck, cross-check, libigl, mesh, Poisson, genus, eigenvalues, verdict, trust",
     "docs/numbers": "numbers, constants, thresholds, defaults",
     "docs/differences": "differences, published code",
     "docs/paper": "paper, publication, abstract, novelty, ablation",

@@ -2,8 +2,8 @@
 Is the skeleton right? A mesh says
 ==================================
 
-Everything starts with the Laplacian of the rings. So make a mesh with vertices of its own, let libigl compute the Laplacian of that,
-contract it, too, and see where the two ways differ. No truth is needed.
+Everything starts with the Laplacian of the rings. So make a mesh with vertices of its own, let libigl compute the
+Laplacian of that, contract it, too, and see where the two ways differ. No truth is needed.
 """
 
 import matplotlib.pyplot as plt
@@ -21,7 +21,8 @@ def show(check):
 
 
 # %%
-# A clean cloud: the mean curvature vectors agree within a few degrees, nearly everywhere (pale), and so do the eigenvalues.
+# A clean cloud: the mean curvature vectors agree within a few degrees, nearly everywhere (pale), and so do the
+# eigenvalues.
 
 clean = y_junction(4096).points
 check = cross_check(clean)
@@ -31,20 +32,26 @@ show(check)
 plt.show()
 
 # %%
-# The same with noise on one arm. The Laplacians notice it before the skeleton does: on that arm the vectors are turned, and both
-# skeletons still have the same limbs.
+# The same with noise on one arm. The Laplacians notice it before the skeleton does: on that arm the vectors are
+# turned, and both skeletons still have the same limbs.
 
 noise = np.random.default_rng(0).normal(scale=0.008, size=clean.shape)
 noisy = clean + noise * (clean[:, :1] < -0.1)
 check = cross_check(noisy)
 print(check.verdict)
-on_arm, elsewhere = np.nanmedian(check.angle[clean[:, 0] < -0.1]), np.nanmedian(check.angle[clean[:, 0] > 0])
+on_arm, elsewhere = (
+    np.nanmedian(check.angle[clean[:, 0] < -0.1]),
+    np.nanmedian(check.angle[clean[:, 0] > 0]),
+)
 print(f"turned by {on_arm:.1f} degrees on the noisy arm, by {elsewhere:.1f} on the rest")
 show(check)
 plt.show()
 
 # %%
-# The solid says how many parts and loops a skeleton must have. One convention to know when you compare yourself: the rows of the
-# contraction are L = 2 igl.cotmatrix; they sum to zero, and L P points inwards. `check.ours` and `check.theirs` have the halves.
+# The solid says how many parts and loops a skeleton must have. One convention to know when you compare yourself: the
+# rows of the contraction are L = 2 igl.cotmatrix; they sum to zero, and L P points inwards. `check.ours` and
+# `check.theirs` have the halves.
 
-print(f"{check.solid.n_solids} part with {check.solid.genus} handles, watertight: {check.solid.is_watertight}")
+print(
+    f"{check.solid.n_solids} part with {check.solid.genus} handles, watertight: {check.solid.is_watertight}"
+)

@@ -40,10 +40,10 @@ def compare_skeletons(ours: Skeleton, theirs: Skeleton, step: float) -> Skeleton
     """How two skeletons agree, by places on both that are `step` apart."""
     both = [distances(*pair, step) for pair in ((ours, theirs), (theirs, ours))]
     in_radii = [distance / radius for distance, radius in both]
-    ends = [each.vertices[each.leaves] for each in (ours, theirs)]
-    radii = [each.radii[each.leaves] for each in (ours, theirs)]
-    pairs = matched(*ends, TIP_REACH * np.maximum(radii[0][:, None], radii[1])) if all(map(len, ends)) else []
-    extra, missing = (np.delete(ends[i], [pair[i] for pair in pairs], axis=0).tolist() for i in (0, 1))
+    mine, other = (each.vertices[each.leaves] for each in (ours, theirs))
+    reach = TIP_REACH * np.maximum(ours.radii[ours.leaves][:, None], theirs.radii[theirs.leaves])
+    pairs = matched(mine, other, reach) if reach.size else []
+    extra, missing = (np.delete(ends, [pair[i] for pair in pairs], 0).tolist() for i, ends in enumerate((mine, other)))
     calls = [[it for it in each.report.decisions if it.about == "limb"] for each in (ours, theirs)]
     closest = [min(each, key=lambda it: abs(it.probability - 0.5)) for each in calls if each]
     certainty = [max(it.probability, 1 - it.probability) for it in closest]

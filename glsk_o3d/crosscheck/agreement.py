@@ -21,7 +21,7 @@ UNCOVERED_SHARE, TILTED_SHARE = 0.01, 0.12  # of the points, beyond which the me
 TURNED_ANGLE, EIGENVALUE_RATIO = 60.0, 1.5  # degrees in the median, and one way or the other: between clean operators
 CERTAIN, LIKELY = 0.9, 0.75  # probabilities from which on a graph agrees, and agrees in part
 
-# Fitted, by benchmarks/crosscheck.py: what is said of the graph, but the first, which is said of the code.
+# Fitted, by benchmarks/crosscheck.py, but the first, which is of the code and not of the graph.
 WEIGHTS = {"operators": -5.0, "solid": -3.7, "limbs": -1.2, "doubt": -3.1, "constant": 4.3}
 
 AGREES, IN_PART, DISTRUST, UNTOLD = VERDICTS = "agrees", "agrees in part", "do not trust", "cannot tell"

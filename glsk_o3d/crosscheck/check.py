@@ -48,9 +48,7 @@ class CrossCheck:
     angle : (N,) float64 array
         Between the mean curvature vectors of cloud and mesh, in degrees, of the contracted point that represents each;
         NaN where the mesh is too far away, 0 where both are flat.
-    skeleton, mesh_skeleton : Skeleton
-    solid : Solid
-        The mesh.
+    skeleton, mesh_skeleton, solid : Skeleton, Skeleton, Solid
     ours, theirs : Operator
         The Laplacians of the contracted points and of the mesh, in the working frame.
     """
@@ -97,8 +95,7 @@ def cross_check(cloud: Any, *, pipeline: Pipeline[Any] | str = "default", mesh: 
     ----------
     cloud : cloud
     pipeline : Pipeline or str
-        ... | RingBuilder | Contractor | ... | Refiner. The mesh's skeleton is made with the same parameters but without
-        reduction.
+        ... | RingBuilder | Contractor | ... | Refiner; the mesh's has the same parameters but no reduction.
     mesh : {"auto", "poisson", "ball_pivoting"}, TriangleMesh, or (vertices, faces)
         "poisson" reconstructs a mesh with vertices of its own, "ball_pivoting" one with the cloud's points as vertices,
         which tests the code more than the method. "auto" takes the triangles of `cloud` if it is a mesh that is not too
@@ -111,7 +108,7 @@ def cross_check(cloud: Any, *, pipeline: Pipeline[Any] | str = "default", mesh: 
     Raises
     ------
     InvalidCloudError
-        The points cannot be skeletonised, or no surface can be reconstructed.
+        The points cannot be skeletonised, or have no surface.
     InvalidParameterError
         The pipeline or the mesh is wrong, or the mesh is too coarse.
     MissingPackageError
@@ -130,20 +127,22 @@ def cross_check(cloud: Any, *, pipeline: Pipeline[Any] | str = "default", mesh: 
         raise InvalidParameterError(f"pipeline = {pipeline!r}: must have a RingBuilder and a Contractor")
     require("igl")  # before the work that it is for
     rings = kinds.index(RingBuilder)
+    builder: Any = pipeline.stages[rings]
     whole = kinds.index(Thinner) if Thinner in kinds[:rings] else rings
     every = Pipeline(*pipeline.stages[:whole])(cloud) if whole else cloud
     every = every if isinstance(every, Points) else Points.of(every)
     points: Points = Pipeline(*pipeline.stages[whole:rings])(every) if whole < rings else every
-    state: Contraction = pipeline.stages[rings](points)
+    state: Contraction = builder(points)
     skeleton: Skeleton = Pipeline(*pipeline.stages[rings + 1 :])(state)
 
     ours = ring_operator(state.positions, state.rings)
     if not ours.area.sum() > LEAST_AREA:
         raise InvalidCloudError("the points lie on a line: there is no surface to compare with")
-    dense = state if points is every else pipeline.stages[rings](every)
+    dense = state if points is every else builder(every)
     frame, body = state.frame, _body(cloud, mesh, dense, spacing(state.positions))
     theirs = operators.mesh_operator(body)
-    angle, rows = operators.compare_operators(ours, state.rings, points.ring_normals, theirs, body)
+    of_rings = state.rings, builder.neighbourhoods(points, ours.places)[1]
+    angle, rows = operators.compare_operators(ours, *of_rings, theirs, body)
     facts = agreement.mesh_facts(body, dense.positions, dense.normals[dense.survivors])
     body = replace(body, vertices=frame.out_of(body.vertices))
     other = mesh_skeleton(body, pipeline)

@@ -84,12 +84,12 @@ class Solid:
         """One of an Open3D mesh, split where it is no manifold; InvalidCloudError if there is hardly any surface."""
         igl = require("igl")
         mesh.remove_duplicated_triangles()
-        mesh.remove_degenerate_triangles()
         vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.triangles, np.int64)
         faces = faces[igl.doublearea(vertices, faces) > 0] if len(faces) else faces
         if len(faces) < MIN_POINTS:
             raise InvalidCloudError(f"only {len(faces)} triangles have an area: there is no surface to compare with")
-        return cls(*igl.remove_unreferenced(*igl.split_nonmanifold(vertices, faces)[:2])[:2], made_by)
+        vertices, faces, *_ = igl.remove_unreferenced(*igl.split_nonmanifold(vertices, faces)[:2])
+        return cls(vertices, faces, made_by)
 
 
 def poisson(points: np.ndarray, outward: np.ndarray, apart: float) -> Solid:
@@ -131,5 +131,6 @@ def given(mesh: Any, frame: Frame, apart: float) -> Solid | None:
     while igl.edge_lengths(solid.vertices, solid.faces).max() > LONGEST_EDGE * apart:
         if len(solid.vertices) > MOST_VERTICES / 4:
             return None
-        solid = Solid(*igl.upsample(solid.vertices, solid.faces, 1), "given")
+        vertices, triangles = igl.upsample(solid.vertices, solid.faces, 1)
+        solid = Solid(vertices, triangles, "given")
     return solid
