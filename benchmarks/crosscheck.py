@@ -115,10 +115,10 @@ def fit(
 def facts(row: dict[str, Any]) -> dict[str, float]:
     """What the probability is made of; a mesh at fault says nothing of the solid and of limbs."""
     found, solid = row["skeletons"], row["mesh"]
-    fault = any(reason.startswith("the mesh ") or reason.startswith("the mesh's own") for reason in row["reasons"])
+    fault = bool(row["mesh"]["faults"])
     counts = found["components"][0] == solid["solids"] and found["loops"][0] == solid["genus"]
-    limbs = bool(found["missing"] or found["extra"])
-    return dict(solid=float(not fault and not counts), limbs=float(not fault and limbs), doubt=found["doubt"])
+    limbs = float(np.log1p(len(found["missing"]) + len(found["extra"])))
+    return dict(solid=float(not fault and not counts), limbs=0.0 if fault else limbs, doubt=found["doubt"])
 
 
 def tell(rows: list[dict], markdown: bool) -> None:

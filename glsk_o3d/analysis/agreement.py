@@ -1,4 +1,4 @@
-"""How two skeletons of one object agree, neither of which is known to be right."""
+"""How two Laplacians of one object agree, and two skeletons, neither of which is known to be right."""
 
 from dataclasses import dataclass
 
@@ -8,6 +8,39 @@ from ..decisions import Place
 from ..skeleton import Skeleton
 from .comparison import TIP_REACH, matched
 from .curves import distances
+
+
+@dataclass(frozen=True, eq=False)
+class OperatorAgreement:
+    """How a cloud's Laplacian agrees with that of a mesh.
+
+    Attributes
+    ----------
+    points, compared, flat : int
+        Points that are contracted; those near enough to the mesh to be compared; of these the ones where neither says
+        that the surface is bent, so that there is no curvature to compare.
+    angle, ratio : dict of str to float
+        Quantiles over the others of the angle between the mean curvature vectors, in degrees, and of the length of ours
+        over that of the mesh's; empty where all is flat.
+    functions : float
+        How differently smooth functions are mapped: norm of the difference over the norm, the median of six waves.
+    eigenvalues : (k, 2) float64 array
+        The smallest fifty of both, ours first, in the working frame.
+    eigenvalue_ratio : float
+        Median of ours over the mesh's, without those that are zero.
+    folded : int
+        Rings that do not go once around their point: none, unless something is wrong with them.
+    """
+
+    points: int
+    compared: int
+    flat: int
+    angle: dict[str, float]
+    ratio: dict[str, float]
+    functions: float
+    eigenvalues: np.ndarray
+    eigenvalue_ratio: float
+    folded: int
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,13 @@
 from pathlib import Path
 from typing import Annotated, Any
 
+from ..errors import did_you_mean
 from .console import print_rows, progress, value_in_words
 from .options import DropInvalid, PipelineName, Preview, ReportPage, ScanFile, option
 from .outputs import Output, check_outputs, tell, write_each
+from .reporting import WrongUsage
 
+MOST_PARTS = 3  # of the mesh that are told of
 MEANINGS = {
     "agrees": "of 260 such clouds 257 had the right graph",
     "agrees in part": "look at the places above: of 34 such clouds 30 had the right graph",
@@ -48,6 +51,8 @@ def crosscheck(
         Output(report, (".html", ".htm"), "report is a page", _save_page),
     ]
     own = None if mesh in MADE_BY else Path(mesh)
+    if own and not own.suffix:
+        raise WrongUsage(f"--mesh: {did_you_mean(mesh, MADE_BY, 'mesh')}")
     check_outputs(outputs, scan, own)
     chosen = choose(pipeline, drop_invalid=drop_invalid)
     with progress() as update:
@@ -62,11 +67,27 @@ def crosscheck(
 
 
 def _told(check: Any) -> dict[str, Any]:
-    """The facts that people read."""
+    """The facts that people read: without eigenvalues, places that the reasons have, and all but the largest parts."""
     facts = check.to_dict()
-    del facts["rows"]["eigenvalues"]
-    first = {"because": facts["reasons"], "worth": MEANINGS[check.verdict], "probability": check.probability}
-    return first | {name: facts[name] for name in ("points", "mesh", "rows", "skeletons")}
+    rows, skeletons, mesh = facts["rows"], facts["skeletons"], facts["mesh"]
+    parts = [value_in_words(part, 4) for part in mesh["parts"][:MOST_PARTS]]
+    more = len(mesh["parts"]) - len(parts)
+    for told, names in ((rows, ["eigenvalues"]), (skeletons, ["missing", "extra", "closest_call"])):
+        for name in names:
+            del told[name]
+    return {
+        "because": facts["reasons"],
+        "worth": MEANINGS[check.verdict],
+        "probability": round(check.probability, 3),
+        "points": facts["points"],
+        "mesh": {name: value for name, value in mesh.items() if name not in ("parts", "faults")},
+        "parts": [*parts, f"and {more} more"] if more else parts,
+        "laplacians": rows,
+        "skeletons": {
+            name: f"{value[0]} and {value[1]}" if isinstance(value, tuple) else value
+            for name, value in skeletons.items()
+        },
+    }
 
 
 def _save_angles(check: Any, path: Path) -> None:

@@ -5,14 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.agreement import SkeletonAgreement, compare_skeletons
+from ..analysis.agreement import OperatorAgreement, SkeletonAgreement, compare_skeletons
 from ..contractor import Contractor
 from ..driver import as_pipeline
 from ..errors import InvalidCloudError, InvalidParameterError
+from ..interop.clouds import SurfaceMesh, surface_mesh
 from ..interop.packages import require
 from ..numerics.inscribed_balls import outward_normals
 from ..numerics.neighbourhoods import spacing
 from ..numerics.operators import Operator, ring_operator
+from ..numerics.vectors import box
 from ..pipeline import Pipeline
 from ..points import Points
 from ..ring_builder import RingBuilder
@@ -25,7 +27,7 @@ from .solid import Solid, ball_pivoting, given, poisson
 
 MADE_BY = ("auto", "poisson", "ball_pivoting")
 COMPARISON_STEP = 0.002  # precision: of the diagonal: spacing of the places where skeletons are compared
-LEAST_AREA = 1e-9  # precision: of a surface in the working frame
+LEAST_SURFACE = 1e-9  # precision: of a surface in the working frame
 DOUBTFUL_ANGLE = 30.0  # measured: degrees by which the mean curvature vectors differ where points are doubtful
 
 
@@ -56,7 +58,7 @@ class CrossCheck:
     verdict: str
     probability: float
     reasons: tuple[str, ...]
-    rows: operators.OperatorAgreement
+    rows: OperatorAgreement
     skeletons: SkeletonAgreement
     mesh: agreement.MeshFacts
     points: np.ndarray = field(repr=False)
@@ -128,42 +130,30 @@ def cross_check(cloud: Any, *, pipeline: Pipeline[Any] | str = "default", mesh: 
     require("igl")  # before the work that it is for
     rings = kinds.index(RingBuilder)
     builder: Any = pipeline.stages[rings]
-    whole = kinds.index(Thinner) if Thinner in kinds[:rings] else rings
-    every = Pipeline(*pipeline.stages[:whole])(cloud) if whole else cloud
+    first = kinds.index(Thinner) if Thinner in kinds[:rings] else rings
+    every = Pipeline(*pipeline.stages[:first])(cloud) if first else cloud
     every = every if isinstance(every, Points) else Points.of(every)
-    points: Points = Pipeline(*pipeline.stages[whole:rings])(every) if whole < rings else every
+    points: Points = Pipeline(*pipeline.stages[first:rings])(every) if first < rings else every
     state: Contraction = builder(points)
     skeleton: Skeleton = Pipeline(*pipeline.stages[rings + 1 :])(state)
 
     ours = ring_operator(state.positions, state.rings)
-    if not ours.area.sum() > LEAST_AREA:
+    if not ours.area.sum() > LEAST_SURFACE:
         raise InvalidCloudError("the points lie on a line: there is no surface to compare with")
     dense = state if points is every else builder(every)
     frame, body = state.frame, _body(cloud, mesh, dense, spacing(state.positions))
     theirs = operators.mesh_operator(body)
     of_rings = state.rings, builder.neighbourhoods(points, ours.places)[1]
     angle, rows = operators.compare_operators(ours, *of_rings, theirs, body)
-    facts = agreement.mesh_facts(body, dense.positions, dense.normals[dense.survivors])
-    body = replace(body, vertices=frame.out_of(body.vertices))
-    other = mesh_skeleton(body, pipeline)
+    whole = replace(body, vertices=frame.out_of(body.vertices))
+    other = mesh_skeleton(whole, pipeline)
+    at_all = dense.positions, dense.normals[dense.survivors]
+    facts = agreement.mesh_facts(body, *at_all, skeleton.n_components, other.report.stop_reason)
     step = COMPARISON_STEP * frame.diagonal * frame.scale
     skeletons = compare_skeletons(skeleton, other, step)
-    verdict, probability, reasons = agreement.judge(rows, skeletons, body, facts, other.report.stop_reason)
-    return CrossCheck(
-        verdict=verdict,
-        probability=probability,
-        reasons=reasons,
-        rows=rows,
-        skeletons=skeletons,
-        mesh=facts,
-        points=state.points,
-        angle=np.append(angle, np.nan)[state.survivor_of_point],
-        skeleton=skeleton,
-        mesh_skeleton=other,
-        solid=body,
-        ours=ours,
-        theirs=theirs,
-    )
+    said = agreement.judge(rows, skeletons, body, facts)
+    of_points = state.points, np.append(angle, np.nan)[state.survivor_of_point]
+    return CrossCheck(*said, rows, skeletons, facts, *of_points, skeleton, other, whole, ours, theirs)
 
 
 def _body(cloud: Any, mesh: Any, dense: Contraction, apart: float) -> Solid:
@@ -171,10 +161,21 @@ def _body(cloud: Any, mesh: Any, dense: Contraction, apart: float) -> Solid:
     named = isinstance(mesh, str)
     if named and mesh not in MADE_BY:
         raise InvalidParameterError(f"mesh = {mesh!r}: must be one of {MADE_BY}, a mesh, or (vertices, faces)")
-    own = given(cloud if named else mesh, dense.frame, apart) if not named or mesh == "auto" else None
-    if own is None and not named:
-        why = f"it has no triangles, or edges too long for points {apart * dense.frame.scale:.3g} apart"
-        raise InvalidParameterError(f"mesh: {why}: remesh it, as by MeshLab's 'Isotropic Explicit Remeshing'")
+    own = None
+    if not named:
+        if isinstance(mesh, tuple) and (len(mesh) != 2 or np.shape(mesh[1])[1:] != (3,)):
+            raise InvalidParameterError("mesh: must be vertices (V, 3) and faces (F, 3), or a triangle mesh")
+        own = given(SurfaceMesh(*mesh) if isinstance(mesh, tuple) else mesh, dense.frame, apart)
+        low, high = box(dense.positions)
+        if own is not None and not (np.abs(box(own.vertices) - np.array([low, high])) < (high - low).max()).all():
+            raise InvalidParameterError(
+                "mesh: is larger than the cloud, or elsewhere: has it the same units and place?"
+            )
+        if own is None:
+            why = f"it has no triangles, or edges too long for points {apart * dense.frame.scale:.3g} apart"
+            raise InvalidParameterError(f"mesh: {why}: remesh it, as by MeshLab's 'Isotropic Explicit Remeshing'")
+    elif mesh == "auto" and np.isfinite(surface_mesh(cloud).vertices).all():
+        own = given(cloud, dense.frame, apart)
     if own is not None:
         return own
     through = dense.positions, outward_normals(dense.positions, dense.normals[dense.survivors], dense.rings)

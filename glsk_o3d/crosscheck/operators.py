@@ -1,10 +1,9 @@
 """Two Laplacians, of rings and of a mesh, compared by what does not need the same vertices."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.sparse.linalg import eigs, eigsh
 
+from ..analysis.agreement import OperatorAgreement
 from ..interop.packages import require
 from ..numerics.operators import Operator, eigenvalues, mapped
 from ..numerics.rings import Rings
@@ -15,39 +14,6 @@ DIFFUSION = 2.0  # measured: ring edges over which both operators are averaged: 
 WITHIN = 1.5  # fitted: ring edges from the mesh, farther than which a point is not compared
 FLAT = 0.1  # fitted: ring edges that diffusion moves a point by, less than which has no direction
 QUANTILES = {"p10": 10, "median": 50, "p90": 90}
-
-
-@dataclass(frozen=True, eq=False)
-class OperatorAgreement:
-    """How a cloud's Laplacian agrees with that of a mesh.
-
-    Attributes
-    ----------
-    points, compared, flat : int
-        Points that are contracted; those near enough to the mesh to be compared; of these the ones where neither says
-        that the surface is bent, so that there is no curvature to compare.
-    angle, ratio : dict of str to float
-        Quantiles over the others of the angle between the mean curvature vectors, in degrees, and of the length of ours
-        over that of the mesh's; empty where all is flat.
-    functions : float
-        How differently smooth functions are mapped: norm of the difference over the norm, the median of six waves.
-    eigenvalues : (k, 2) float64 array
-        The smallest fifty of both, ours first, in the working frame.
-    eigenvalue_ratio : float
-        Median of ours over the mesh's, without those that are zero.
-    folded : int
-        Rings that do not go once around their point: none, unless something is wrong with them.
-    """
-
-    points: int
-    compared: int
-    flat: int
-    angle: dict[str, float]
-    ratio: dict[str, float]
-    functions: float
-    eigenvalues: np.ndarray
-    eigenvalue_ratio: float
-    folded: int
 
 
 def mesh_operator(solid: Solid) -> Operator:

@@ -8,17 +8,20 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import InvalidCloudError
-from ..interop.clouds import SurfaceMesh, surface_mesh, to_point_cloud
+from ..interop.clouds import surface_mesh, to_point_cloud
 from ..interop.packages import import_open3d, require
 from ..numerics.frame import MIN_POINTS, Frame
 from ..numerics.neighbourhoods import spacing
 
 CELL = 1.25  # measured: side of the octree's cells, in spacings: smaller ones follow noise, larger ones close holes
+SLIVER = 1e-12  # precision: of the mean area of triangles
+LEAST_CELLS = 4  # derived: across a surface: the octree is at least two deep
 FULL_DEPTH = 4  # speed: of the octree, down to which it is a full grid
 REACH = 2.5  # fitted: cells from the nearest point: what is farther away is no surface
 LEAST_PART = 0.02  # fitted: of the area of the largest: smaller ones are bubbles
 BALL_RADII = (1.0, 2.0, 4.0)  # fitted: of the rolling balls, in spacings
 LONGEST_EDGE = 3.0  # fitted: of a given mesh, in spacings, for its Laplacian to be that of the surface
+TRIANGLES, MOST_TIMES = 10, 3  # speed: of a given mesh, in a square of a spacing, and that many times as many
 MOST_VERTICES = 50_000  # speed: of a given mesh whose edges were halved
 
 
@@ -29,6 +32,11 @@ class Part(NamedTuple):
     volume: float | None
     genus: int
     borders: int
+
+    @property
+    def is_cavity(self) -> bool:
+        """Whether it is the wall of a cavity: its normals point inward."""
+        return self.volume is not None and self.volume < 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,26 +78,30 @@ class Solid:
 
     @property
     def n_solids(self) -> int:
-        """Parts that are not walls of cavities, which are turned the other way than the largest."""
-        sides = [np.sign(part.volume or 0) for part in self.parts]
-        return int(np.sum(np.multiply(sides, sides[0]) >= 0))
+        """Parts that are not walls of cavities."""
+        return sum(not part.is_cavity for part in self.parts)
 
     @property
     def genus(self) -> int:
-        """Handles of all parts: the loops that a skeleton has."""
-        return sum(part.genus for part in self.parts)
+        """Handles of the solids: the loops that a skeleton has."""
+        return sum(part.genus for part in self.parts if not part.is_cavity)
 
     @classmethod
     def of(cls, mesh: Any, made_by: str) -> "Solid":
         """One of an Open3D mesh, split where it is no manifold; InvalidCloudError if there is hardly any surface."""
         igl = require("igl")
+        mesh.remove_duplicated_vertices()
         mesh.remove_duplicated_triangles()
         vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.triangles, np.int64)
-        faces = faces[igl.doublearea(vertices, faces) > 0] if len(faces) else faces
+        area = igl.doublearea(vertices, faces) if len(faces) else np.empty(0)
+        faces = faces[area > SLIVER * area.mean()] if len(faces) else faces
         if len(faces) < MIN_POINTS:
             raise InvalidCloudError(f"only {len(faces)} triangles have an area: there is no surface to compare with")
+        faces = igl.bfs_orient(faces)[0] if made_by == "given" else faces
         vertices, faces, *_ = igl.remove_unreferenced(*igl.split_nonmanifold(vertices, faces)[:2])
-        return cls(vertices, faces, made_by)
+        solid = cls(vertices, faces, made_by)
+        inside_out = [part.is_cavity for part in solid.parts if part.volume is not None][:1] == [True]
+        return cls(vertices, faces[:, ::-1].copy(), made_by) if inside_out else solid
 
 
 def poisson(points: np.ndarray, outward: np.ndarray, apart: float) -> Solid:
@@ -98,6 +110,8 @@ def poisson(points: np.ndarray, outward: np.ndarray, apart: float) -> Solid:
     `apart` is the spacing that its cells go by. What is far from all points is left out, and so are small parts.
     """
     o3d, cloud, cell = import_open3d(), to_point_cloud(points), CELL * apart
+    if cell > np.ptp(points, axis=0).max() / LEAST_CELLS:
+        raise InvalidCloudError(f"{len(points)} points are too few for a surface to be reconstructed")
     cloud.normals = o3d.utility.Vector3dVector(outward)
     asked = dict(depth=0, width=cell, full_depth=FULL_DEPTH, linear_fit=True, n_threads=1)
     mesh, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, **asked)
@@ -116,18 +130,23 @@ def ball_pivoting(points: np.ndarray, outward: np.ndarray) -> Solid:
 
 
 def given(mesh: Any, frame: Frame, apart: float) -> Solid | None:
-    """A mesh of the user's in the working frame, all edges halved until none is longer than three spacings.
+    """A mesh of the user's in the working frame, simplified if it is much finer than the points are apart.
 
-    None if that makes too many, or if it has no triangles. InvalidCloudError if it is no mesh.
+    Else all edges are halved until none is longer than three spacings. None if that makes too many, or if it has no
+    triangles; InvalidCloudError if it is no mesh.
     """
-    vertices, triangles = surface_mesh(SurfaceMesh(*mesh) if isinstance(mesh, tuple) else mesh)
+    vertices, triangles = surface_mesh(mesh)
     if len(triangles) == 0:
         return None
     if not np.isfinite(vertices).all():
         raise InvalidCloudError("the mesh has coordinates that are not finite")
     o3d, igl = import_open3d(), require("igl")
     arrays = o3d.utility.Vector3dVector(frame.into(vertices)), o3d.utility.Vector3iVector(triangles)
-    solid = Solid.of(o3d.geometry.TriangleMesh(*arrays), "given")
+    mesh = o3d.geometry.TriangleMesh(*arrays)
+    enough = int(TRIANGLES * mesh.get_surface_area() / apart**2)
+    if len(triangles) > MOST_TIMES * enough:
+        return Solid.of(mesh.simplify_quadric_decimation(enough), "given")
+    solid = Solid.of(mesh, "given")
     while igl.edge_lengths(solid.vertices, solid.faces).max() > LONGEST_EDGE * apart:
         if len(solid.vertices) > MOST_VERTICES / 4:
             return None

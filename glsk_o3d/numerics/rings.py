@@ -154,9 +154,10 @@ class Rings:
         They are ascending, not in rotational order, since in a mesh that is no manifold there is none.
         """
         sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        edges, count = np.unique(sides, axis=0, return_counts=True)
-        centre, neighbour = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0).T
-        closed = np.ones(n, bool)
+        number, count = np.unique(sides @ [n, 1], return_counts=True)
+        edges = np.column_stack([number // n, number % n])
+        both = np.sort(np.concatenate([number, edges @ [1, n]]))
+        centre, neighbour, closed = both // n, both % n, np.ones(n, bool)
         closed[edges[count == 1]] = False
         return cls(np.searchsorted(centre, np.arange(n + 1)), neighbour, closed)
 

@@ -30,7 +30,7 @@ def test_what_it_says_and_writes(invoke, scans, tmp_path, check):
     assert first.endswith("name.ply: agrees")
     words = " ".join(run.stdout.split())
     assert f"compared {check.rows.compared}, " in words
-    assert "loops 1 1" in words
+    assert "loops 1 and 1" in words
     assert "had the right graph" in words
     assert lines[-3:] == ["wrote marked.ply", "wrote both.png", "wrote page.html"]
     marked = read_tensor_cloud(tmp_path / "marked.ply")

@@ -68,8 +68,10 @@ def bench(limbs):
     def judged(**broken):
         now = SimpleNamespace(**(vars(parts) | broken))
         _, rows = compare_operators(now.ours, now.rings, points.ring_normals, now.theirs, body)
-        skeletons = compare_skeletons(now.skeleton, check.mesh_skeleton, 0.002 * state.frame.diagonal)
-        return judge(rows, skeletons, check.solid, check.mesh, check.mesh_skeleton.report.stop_reason)
+        skeletons = compare_skeletons(
+            now.skeleton, check.mesh_skeleton, 0.002 * state.frame.diagonal * state.frame.scale
+        )
+        return judge(rows, skeletons, check.solid, check.mesh)
 
     parts.judged = judged
     return parts

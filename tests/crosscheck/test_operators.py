@@ -4,6 +4,7 @@ import igl
 import numpy as np
 import open3d as o3d
 import pytest
+from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import eigs, eigsh
 from scipy.spatial import Delaunay
 
@@ -35,13 +36,7 @@ def folded_up(operator, tile, n):
     rows = operator.laplacian.tocsr()[ordered].tocoo()
     laplacian = np.zeros((n, n))
     np.add.at(laplacian, (rows.row, tile[rows.col] % n), rows.data)
-    return Operator(operator.places[ordered], igl_sparse(laplacian), operator.area[ordered])
-
-
-def igl_sparse(dense):
-    from scipy.sparse import csr_matrix
-
-    return csr_matrix(dense)
+    return Operator(operator.places[ordered], csr_matrix(laplacian), operator.area[ordered])
 
 
 def flat_torus(side):
@@ -96,6 +91,23 @@ def test_the_mean_curvature_vector_of_a_sphere(even_ball):
             assert np.median(np.linalg.norm(found, axis=1)) == pytest.approx(4 / (1 + 8 * length**2), rel=0.01)
 
 
+@pytest.mark.parametrize("shape", ["torus", "y_junction", "sauropod"])
+def test_areas_of_an_ordinary_cloud_tile_the_surface(shape):
+    drawn = samples.SAMPLES[shape](3000)
+    state = (Sampler() | RingBuilder())(drawn.points)
+    found = ring_operator(state.positions, state.rings).area.sum() * state.frame.scale**2
+    true = {"torus": 0.16 * np.pi**2, "y_junction": None, "sauropod": None}[shape]
+    solid = cross_check(drawn.points).solid
+    assert found == pytest.approx(true or solid.parts[0].area, rel=0.1)
+
+
+def test_points_of_a_grid_keep_their_areas():
+    around, along = np.meshgrid(np.linspace(0, 2 * np.pi, 38, endpoint=False), np.linspace(0, 2, 60))
+    points = np.column_stack([0.2 * np.cos(around.ravel()), 0.2 * np.sin(around.ravel()), along.ravel()])
+    found = cross_check(points)
+    assert (found.verdict, found.rows.eigenvalue_ratio) == ("agrees", pytest.approx(1, abs=0.06))
+
+
 def test_a_constant_is_mapped_to_nothing(even_ball):
     points, faces = even_ball(300)
     for operator in (of_rings(points)[0], of_mesh(points, faces)):
@@ -121,8 +133,7 @@ def test_scale_does_not_matter(even_ball):
     found = []
     for unit in (1.0, 1e3):
         state = (Sampler(frame="box") | RingBuilder())(points * unit)
-        ours, solid = ring_operator(state.cloud * unit, state.rings), Solid(points * unit, faces, "given")
-        solid = Solid((points * 1.6) * unit, faces, "given")
+        ours, solid = ring_operator(state.cloud * unit, state.rings), Solid(1.6 * points * unit, faces, "given")
         found.append(compare_operators(ours, state.rings, state.cloud, mesh_operator(solid), solid)[1])
     for name in ("angle", "ratio"):
         assert getattr(found[0], name) == pytest.approx(getattr(found[1], name), rel=1e-5)

@@ -4,12 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.sparse import diags_array
 
 from glsk_o3d import editing
 from glsk_o3d.analysis.agreement import compare_skeletons
 from glsk_o3d.crosscheck.agreement import judge
-from glsk_o3d.numerics.operators import Operator, ring_operator
+from glsk_o3d.numerics.operators import ring_operator
 from glsk_o3d.numerics.rings import Rings
 from glsk_o3d.skeleton import Skeleton
 
@@ -25,16 +24,7 @@ FAULTS = {
     "weights halved": lambda it: it._replace(laplacian=it.laplacian / 2),
     "weights doubled": lambda it: it._replace(laplacian=it.laplacian * 2),
     "mass forgotten": lambda it: it._replace(area=np.ones(len(it.area))),
-    "all neighbours alike": lambda it: Operator(it.places, uniform(it.laplacian), it.area),
 }
-
-
-def uniform(laplacian):
-    """The same neighbours with equal weights, as the umbrella operator has them."""
-    adjacency = (laplacian != 0).astype(float)
-    adjacency.setdiag(0)
-    adjacency.eliminate_zeros()
-    return (adjacency - diags_array(np.asarray(adjacency.sum(axis=1)).ravel())).tocsr()
 
 
 @pytest.mark.parametrize("fault", FAULTS)
@@ -42,7 +32,7 @@ def test_a_wrong_laplacian_is_not_trusted(bench, fault):
     verdict, probability, reasons = bench.judged(ours=FAULTS[fault](bench.ours))
     assert verdict == "do not trust"
     assert probability < 0.5
-    assert any("eigenvalues" in reason or "turned" in reason for reason in reasons)
+    assert any(word in " ".join(reasons) for word in ("eigenvalues", "turned", "times as long", "mapped"))
 
 
 def test_one_ring_out_of_order_is_enough(bench):
@@ -52,7 +42,7 @@ def test_one_ring_out_of_order_is_enough(bench):
     indices[[start + 1, start + 4]] = indices[[start + 4, start + 1]]
     permuted = Rings(rings.indptr, indices, rings.closed)
     verdict, _, reasons = bench.judged(rings=permuted, ours=ring_operator(bench.ours.places, permuted))
-    assert (verdict, reasons[0]) == ("do not trust", "1 rings do not go once around their point")
+    assert (verdict, reasons[0]) == ("do not trust", "rings that do not go once around their point: 1")
 
 
 def test_a_limb_cut_off_is_named_with_its_place(bench):
@@ -85,6 +75,6 @@ def test_a_loop_that_the_object_does_not_have(bench):
 def test_a_loop_of_the_object_that_was_cut_open(check):
     opened, _ = editing.cut_loops(check.skeleton)
     skeletons = compare_skeletons(opened, check.mesh_skeleton, 0.003)
-    verdict, _, reasons = judge(check.rows, skeletons, check.solid, check.mesh, "settled")
+    verdict, _, reasons = judge(check.rows, skeletons, check.solid, check.mesh)
     assert verdict == "do not trust"
     assert "loops: 0 in the skeleton, 1 in the mesh" in reasons

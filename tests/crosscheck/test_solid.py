@@ -47,7 +47,7 @@ def test_two_linked_rings_are_two_solids():
 def test_the_wall_of_a_cavity_is_no_solid(even_ball):
     points, faces = even_ball(500)
     both = np.vstack([points, 0.5 * points]), np.vstack([faces, faces[:, ::-1] + len(points)])
-    solid = given(both, UNIT, 1.0)
+    solid = given(SurfaceMesh(*both), UNIT, 0.1)
     assert [part.volume > 0 for part in solid.parts] == [True, False]
     assert (solid.n_solids, solid.genus) == (1, 0)
 
@@ -77,7 +77,7 @@ def test_the_same_twice():
 
 def test_long_edges_are_halved_and_the_surface_stays():
     box = triangles(o3d.geometry.TriangleMesh.create_box(1, 1, 4))
-    solid = given(box, UNIT, 0.1)
+    solid = given(SurfaceMesh(*box), UNIT, 0.1)
     a, b, c = solid.vertices[solid.faces].transpose(1, 0, 2)
     assert max(np.linalg.norm(p - q, axis=1).max() for p, q in ((a, b), (b, c), (c, a))) <= 0.3
     assert (solid.parts[0].area, solid.parts[0].volume) == (pytest.approx(18), pytest.approx(4))
@@ -85,7 +85,7 @@ def test_long_edges_are_halved_and_the_surface_stays():
 
 def test_what_would_take_too_many_is_not_taken():
     box = triangles(o3d.geometry.TriangleMesh.create_box(1, 1, 4))
-    assert given(box, UNIT, 0.001) is None
+    assert given(SurfaceMesh(*box), UNIT, 0.001) is None
     assert given(np.eye(3), UNIT, 0.1) is None  # a cloud
 
 
@@ -94,7 +94,7 @@ def test_two_tetrahedra_that_share_an_edge_or_a_corner_are_two_parts():
     sides = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
     for other in ([0, 1, 4, 5], [0, 6, 4, 5]):
         faces = np.vstack([sides, np.array(other)[sides]])
-        solid = given((corners, faces), UNIT, 1.0)
+        solid = given(SurfaceMesh(corners, faces), UNIT, 1.0)
         assert [(part.borders, part.genus) for part in solid.parts] == [(0, 0), (0, 0)]
 
 
@@ -107,3 +107,29 @@ def test_meshes_that_are_wrong():
     ):
         with pytest.raises(InvalidCloudError):
             given(SurfaceMesh(*wrong), UNIT, 0.1)
+
+
+@pytest.mark.parametrize("spoil", ["corners apart", "inside out", "every other face turned"])
+def test_what_files_do_to_a_mesh_is_mended(even_ball, spoil):
+    vertices, faces = even_ball(800)
+    if spoil == "corners apart":  # as in STL
+        vertices, faces = vertices[faces].reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3)
+    else:
+        faces = np.where(
+            np.arange(len(faces))[:, None] % (2 if spoil.startswith("every") else 1) == 0, faces[:, ::-1], faces
+        )
+    (part,) = given(SurfaceMesh(vertices, faces), UNIT, 0.1).parts
+    assert (part.genus, part.borders) == (0, 0)
+    assert part.volume == pytest.approx(np.pi / 6, rel=0.02)
+
+
+def test_a_much_finer_mesh_is_simplified():
+    ring = triangles(o3d.geometry.TriangleMesh.create_torus(0.4, 0.1, 300, 150))
+    solid = given(SurfaceMesh(*ring), UNIT, 0.03)
+    assert len(solid.faces) < 30_000
+    assert (solid.genus, solid.is_watertight) == (1, True)
+
+
+def test_too_few_points():
+    with pytest.raises(InvalidCloudError, match="10 points are too few"):
+        solid_of(tube(10).points)
