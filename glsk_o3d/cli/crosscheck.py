@@ -106,5 +106,8 @@ def _save_picture(check: Any, path: Path) -> None:
 def _save_page(check: Any, path: Path) -> None:
     from .. import save_report
 
-    told = {name: value_in_words(value) for name, value in ({"verdict": check.verdict} | _told(check)).items()}
+    told = {
+        name: value_in_words(value).replace("\n", "; ")
+        for name, value in ({"verdict": check.verdict} | _told(check)).items()
+    }
     save_report(check.skeleton, path, title=path.stem, facts={"Cross-check": told})

@@ -77,9 +77,7 @@ def _page(skeleton: Skeleton, title: str, facts: Mapping[str, Mapping[str, str]]
     report, kind = skeleton.report, "Curve skeleton" if len(skeleton.vertices) else "Point cloud"
     now = datetime.now(timezone.utc).strftime("%d %B %Y, %H:%M UTC")
     thinning = f"The view shows {len(shown):,} of {finite:,} points, drawn at random."
-    more = [
-        markup("<h2>{}</h2>{}", head, _table(("fact", "value"), list(told.items()))) for head, told in facts.items()
-    ]
+    more = [told(heading, rows) for heading, rows in facts.items()]
     below = [*more, contraction(report), topology(report), support(report), origin(report)]
     return markup(
         html,
@@ -210,6 +208,12 @@ def support(report: Report) -> Markup:
     ]
     share = f"{report.n_agreeing:,} of {report.n_draws:,} samples of the cloud have the same graph."
     return markup("<h2>Support</h2><p>{}</p>{}", share, _table(("part", "here", "samples"), rows, "support"))
+
+
+def told(heading: str, rows: Mapping[str, str]) -> Markup:
+    """A section of names and texts."""
+    lines = [markup("<tr><td>{}</td><td>{}</td></tr>", *row) for row in rows.items()]
+    return markup('<h2>{}</h2><div class="run support"><table>{}</table></div>', heading, lines)
 
 
 def origin(report: Report) -> Markup:

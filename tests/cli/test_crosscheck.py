@@ -38,7 +38,7 @@ def test_what_it_says_and_writes(invoke, scans, tmp_path, check):
     assert "colors" in marked.point
     page = (tmp_path / "page.html").read_text("utf-8")
     assert "<h2>Cross-check</h2>" in page
-    assert "<td>verdict</td><td>agrees</td>" in page
+    assert "<tr><td>verdict</td><td>agrees</td></tr>" in page
 
 
 def test_a_mesh_of_the_users(invoke, scans, tmp_path):
