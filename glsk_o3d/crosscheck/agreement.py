@@ -23,7 +23,7 @@ RATIO, MAPPED = 1.5, 0.8  # one way or the other, of lengths and eigenvalues; an
 CERTAIN, LIKELY = 0.9, 0.75  # probabilities from which on a graph agrees, and agrees in part
 
 # Fitted, by benchmarks/crosscheck.py, but the first, which is of the code and not of the graph.
-WEIGHTS = {"operators": -5.0, "solid": -3.7, "limbs": -1.7, "doubt": -3.1, "constant": 4.3}
+WEIGHTS = {"operators": -5.0, "solid": -4.2, "limbs": -1.2, "doubt": -3.4, "constant": 4.4}
 
 AGREES, IN_PART, DISTRUST, UNTOLD = VERDICTS = "agrees", "agrees in part", "do not trust", "cannot tell"
 

@@ -60,8 +60,8 @@ CASES = [
     ("do not trust", {"solid": {"solids": 2}}, "components: 1 in the skeleton, 2 in the mesh"),
     ("agrees in part", {"skeletons": {"missing": AWAY}}, "the mesh's skeleton ends at (1, 2, 3), the cloud's does not"),
     ("agrees in part", {"skeletons": {"extra": AWAY}}, "the skeleton ends at (1, 2, 3), the mesh's does not"),
-    ("do not trust", {"skeletons": {"missing": 3 * AWAY, "extra": 3 * AWAY}}, "does not"),
-    ("agrees in part", {"skeletons": {"doubt": 0.75}}, "the branch at (1, 2, 3) is a limb is a close call"),
+    ("do not trust", {"skeletons": {"missing": 9 * AWAY, "extra": 9 * AWAY}}, "does not"),
+    ("agrees in part", {"skeletons": {"doubt": 0.8}}, "the branch at (1, 2, 3) is a limb is a close call"),
     ("do not trust", {"skeletons": {"doubt": 1.3}}, "the branch at (1, 2, 3) is a limb is a close call"),
 ]
 
