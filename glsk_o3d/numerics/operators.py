@@ -29,7 +29,7 @@ def ring_operator(points: np.ndarray, rings: Rings) -> Operator:
     """The Laplacian that contracts points (n, 3), over the Voronoi areas of their rings (Meyer et al. 2003).
 
     Such areas tile the surface although rings are not mutual, and cocircular neighbours may be left out of them; thirds
-    of fan triangles would not. Where obtuse triangles leave nothing of one, it is a tenth of its third.
+    of fan triangles would not. Where triangles are obtuse, an area is at most that of the fan, and not nothing.
     """
     laplacian = cotangent_laplacian(points, rings) / 2
     a, b, c = points[rings.triangles].transpose(1, 0, 2)
@@ -37,7 +37,7 @@ def ring_operator(points: np.ndarray, rings: Rings) -> Operator:
     entries = laplacian.tocoo()
     way = points[entries.row] - points[entries.col]
     voronoi = np.bincount(entries.row, entries.data * dot(way, way), len(points)) / 4
-    return Operator(points, laplacian, np.maximum(np.maximum(voronoi, LEAST_AREA * third), TINY))
+    return Operator(points, laplacian, np.maximum(np.clip(voronoi, LEAST_AREA * third, 3 * third), TINY))
 
 
 def mapped(operator: Operator, values: np.ndarray, length: float) -> np.ndarray:

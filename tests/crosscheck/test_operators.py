@@ -91,14 +91,14 @@ def test_the_mean_curvature_vector_of_a_sphere(even_ball):
             assert np.median(np.linalg.norm(found, axis=1)) == pytest.approx(4 / (1 + 8 * length**2), rel=0.01)
 
 
-@pytest.mark.parametrize("shape", ["torus", "y_junction", "sauropod"])
+@pytest.mark.parametrize("shape", ["torus", "y_junction"])
 def test_areas_of_an_ordinary_cloud_tile_the_surface(shape):
     drawn = samples.SAMPLES[shape](3000)
     state = (Sampler() | RingBuilder())(drawn.points)
     found = ring_operator(state.positions, state.rings).area.sum() * state.frame.scale**2
-    true = {"torus": 0.16 * np.pi**2, "y_junction": None, "sauropod": None}[shape]
+    true = {"torus": 0.16 * np.pi**2}.get(shape)
     solid = cross_check(drawn.points).solid
-    assert found == pytest.approx(true or solid.parts[0].area, rel=0.1)
+    assert found == pytest.approx(true or solid.parts[0].area, rel=0.06)
 
 
 def test_points_of_a_grid_keep_their_areas():
