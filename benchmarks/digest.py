@@ -1,8 +1,9 @@
 """Digests of skeletons, to show that a change of the code did not change a bit of a result.
 
-Each cloud is skeletonised by three pipelines; a SHA-256 stands for the vertices, edges, radii and vertex_of_point of
-each result, or the name of the error that came instead. `digest.py make BEFORE.json` writes them, and after the change
-`digest.py compare BEFORE.json` makes them anew, prints a table and what differs; exit code 1 if anything does.
+Each cloud is skeletonised by four pipelines; three SHA-256 stand for all arrays of each result, for its decisions, and
+for the rest of its report but times and versions, or the name of the error that came instead. `digest.py make
+BEFORE.json` writes them, and after the change `digest.py compare BEFORE.json` makes them anew, prints a table and what
+differs; exit code 1 if anything does.
 
 It uses only what older versions of the package have too, so that it also runs with one of these on PYTHONPATH.
 """
@@ -15,6 +16,7 @@ import os
 import warnings
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, fields
 from itertools import product
 from multiprocessing import get_context
 from pathlib import Path
@@ -32,12 +34,12 @@ from rich.table import Table
 import glsk_o3d as glsk
 from glsk_o3d import samples
 
-PIPELINES = ("default", "wen2024", "cao2010")
-ARRAYS = ("vertices", "edges", "radii", "vertex_of_point")
+PIPELINES = ("default", "tree", "wen2024", "cao2010")
+UNSTEADY = ("seconds", "versions")  # of a report: other in every run
 SAMPLES = ("tube", "y_junction", "torus", "two_rings", "helix", "sauropod", "tree", "sphere", "sheet")
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
-Digests = dict[str, dict[str, dict[str, str]]]  # by group, cloud and pipeline
+Digests = dict[str, dict[str, dict[str, dict[str, str]]]]  # by group, cloud, pipeline and part of the result
 
 app = typer.Typer(add_completion=False, help=__doc__, pretty_exceptions_enable=False, rich_markup_mode=None)
 Shared = Annotated[Path, typer.Option(help="Folder with data/*.ply and truth/*.npz; left out where there is none.")]
@@ -57,8 +59,8 @@ def clouds(shared: Path, size: int) -> Iterator[tuple[str, str, Path | str, str 
         yield "samples", f"{name} {size}", name, size
 
 
-def digest(case: tuple[str, str, Path | str, str | int]) -> tuple[str, str, dict[str, str]]:
-    """Group and name of a cloud, and for each pipeline the first digits of a SHA-256 of arrays, or the error's name."""
+def digest(case: tuple[str, str, Path | str, str | int]) -> tuple[str, str, dict[str, dict[str, str]]]:
+    """Group and name of a cloud, and for each pipeline the first digits of the SHA-256, or the error's name."""
     group, name, source, which = case
     if isinstance(source, str):
         points = getattr(samples, source)(which).points
@@ -74,11 +76,23 @@ def digest(case: tuple[str, str, Path | str, str | int]) -> tuple[str, str, dict
             try:
                 skeleton = glsk.skeletonize(points, pipeline)
             except glsk.GlskError as error:
-                found[pipeline] = type(error).__name__
+                found[pipeline] = {"error": type(error).__name__}
                 continue
-        parts = (np.ascontiguousarray(getattr(skeleton, array)).tobytes() for array in ARRAYS)
-        found[pipeline] = hashlib.sha256(b"".join(parts)).hexdigest()[:16]
+        found[pipeline] = {part: hashlib.sha256(text).hexdigest()[:16] for part, text in parts(skeleton).items()}
     return group, name, found
+
+
+def parts(skeleton: glsk.Skeleton) -> dict[str, bytes]:
+    """What the digests of a skeleton are of."""
+    report = asdict(skeleton.report)
+    decisions = report.pop("decisions")
+    for unsteady in UNSTEADY:
+        for told in (report, *report["iterations"]):
+            told.pop(unsteady, None)
+    names = [field.name for field in fields(skeleton) if isinstance(getattr(skeleton, field.name), np.ndarray)]
+    arrays = [(name, np.ascontiguousarray(getattr(skeleton, name))) for name in sorted(names)]
+    held = b"".join(f"{name} {array.dtype} {array.shape}".encode() + array.tobytes() for name, array in arrays)
+    return {"arrays": held, "decisions": repr(decisions).encode(), "report": repr(sorted(report.items())).encode()}
 
 
 def digests(shared: Path, size: int, jobs: int) -> Digests:
@@ -107,10 +121,12 @@ def compare(before: Path, shared: Shared = SHARED, size: Size = 4096, jobs: Jobs
         there, here = old.get(group, {}), new.get(group, {})
         same = dict.fromkeys(PIPELINES, 0)
         for name, pipeline in product(sorted({*there, *here}), PIPELINES):
-            before, now = (it.get(name, {}).get(pipeline, "nothing") for it in (there, here))
+            before, now = (it.get(name, {}).get(pipeline, {}) for it in (there, here))
             same[pipeline] += before == now
-            if before != now:
-                changed.append(f"differs: {name}, {pipeline}: {before} before, {now} now")
+            for part in sorted({*before, *now}):
+                was, is_now = (it.get(part, "nothing") for it in (before, now))
+                if was != is_now:
+                    changed.append(f"differs: {name}, {pipeline}, {part}: {was} before, {is_now} now")
         table.add_row(group, str(len({*there, *here})), *map(str, same.values()))
     Console().print(table)
     print(*changed, sep="\n", end="\n" * bool(changed))

@@ -13,12 +13,15 @@ def test_what_differs_is_said(call, tmp_path):
     told = json.loads(path.read_text())
     samples = told["samples"]
     assert [*samples] == [f"{name} 64" for name in sorted(SAMPLES)]
-    digests = [digest for each in samples.values() for digest in each.values()]
-    assert len({*digests}) == len(digests) == 3 * len(SAMPLES)
-    assert "samples 9 9 9 9" in " ".join(call("compare", path, *words).split())
-    digest = samples["torus 64"]["wen2024"]
-    samples["torus 64"]["wen2024"] = "InvalidCloudError"
-    path.write_text(json.dumps(told))
+    digests = [told for each in samples.values() for told in each.values()]
+    assert all([*told] == ["arrays", "decisions", "report"] for told in digests)
+    assert len({told["arrays"] for told in digests}) == len(digests) == 4 * len(SAMPLES)
+    assert "samples 9 9 9 9 9" in " ".join(call("compare", path, *words).split())
+    digest = samples["torus 64"]["wen2024"]["decisions"]
+    samples["torus 64"]["wen2024"]["decisions"] = "other"
+    samples["tube 64"]["tree"] = {"error": "InvalidCloudError"}
+    path.write_text(json.dumps({"samples": samples}))
     printed = call("compare", path, *words, code=1)
-    assert "samples 9 9 8 9" in " ".join(printed.split())
-    assert f"differs: torus 64, wen2024: InvalidCloudError before, {digest} now" in printed
+    assert "samples 9 9 8 8 9" in " ".join(printed.split())
+    assert f"differs: torus 64, wen2024, decisions: other before, {digest} now" in printed
+    assert "differs: tube 64, tree, error: InvalidCloudError before, nothing now" in printed
