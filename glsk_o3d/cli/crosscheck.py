@@ -12,8 +12,8 @@ from .reporting import WrongUsage
 MOST_PARTS = 3  # of the mesh that are told of
 MEANINGS = {
     "agrees": "of 258 such clouds 255 had the right graph",
-    "agrees in part": "look at the places above: of 31 such clouds 27 had the right graph",
-    "do not trust": "look at the places above: of 76 such clouds 30 had the right graph",
+    "agrees in part": "look at what is said above: of 31 such clouds 27 had the right graph",
+    "do not trust": "look at what is said above: of 76 such clouds 30 had the right graph",
     "cannot tell": "the mesh is at fault: no word against the skeleton",
 }
 """What to expect of each verdict; the numbers are those of docs/crosscheck.md."""
@@ -41,7 +41,8 @@ def crosscheck(
     from .. import read_cloud
     from ..crosscheck import cross_check
     from ..crosscheck.check import MADE_BY
-    from ..io.scans import read_mesh
+    from ..interop.clouds import SurfaceMesh
+    from ..io.scans import read_mesh, read_scan
     from ..viewing.figures import printable
     from .overrides import choose
 
@@ -57,7 +58,8 @@ def crosscheck(
     chosen = choose(pipeline, drop_invalid=drop_invalid)
     with progress() as update:
         update(f"reading {scan.name}")
-        cloud = read_cloud(scan)
+        held = read_scan(scan)
+        cloud = SurfaceMesh(held.positions, held.triangles) if len(held.triangles) else read_cloud(scan)
         surface = read_mesh(own) if own else mesh
         update("comparing with a mesh")
         check = cross_check(cloud, pipeline=chosen, mesh=surface)

@@ -58,17 +58,17 @@ def judge(
     by_mesh = WEIGHTS["operators"] * bool(operators) + WEIGHTS["solid"] * bool(counts)
     by_mesh += WEIGHTS["limbs"] * np.log1p(len(limbs))
     probability = float(expit(by_itself + (0 if mesh.faults else by_mesh)))
-    reasons = [*mesh.faults, *operators, *counts, *limbs]
-    if rows.folded:
-        reasons.insert(0, f"rings that do not go once around their point: {rows.folded}")
+    folded = _wrong((rows.folded > 0, f"rings that do not go once around their point: {rows.folded}"))
+    reasons = [*folded, *mesh.faults, *operators, *counts, *limbs]
     if skeletons.closest_call and expit(by_itself) < CERTAIN:
         reasons.append(f"whether the branch at ({coordinates(skeletons.closest_call)}) is a limb is a close call")
     differs = bool(operators or counts or limbs)
-    if mesh.faults and (differs or mesh.uncovered > ELSEWHERE_SHARE):
+    both = len({*skeletons.components}) == 1 == len({*skeletons.loops})
+    if mesh.faults and (differs or not both or mesh.uncovered > ELSEWHERE_SHARE):
         verdict = UNTOLD
     else:
         verdict = DISTRUST if probability < LIKELY else IN_PART if differs or probability < CERTAIN else AGREES
-    return DISTRUST if rows.folded else verdict, probability, tuple(reasons)
+    return DISTRUST if folded else verdict, probability, tuple(reasons)
 
 
 def of_mesh(solid: Solid, components: int, uncovered: float, tilted: float, stop_reason: str) -> tuple[str, ...]:
@@ -77,7 +77,8 @@ def of_mesh(solid: Solid, components: int, uncovered: float, tilted: float, stop
     return _wrong(
         (REFUSED in stop_reason, f"the mesh's own contraction failed: {stop_reason}"),
         (torn, f"the mesh is in {solid.n_solids} parts"),
-        (uncovered > UNCOVERED_SHARE, f"the mesh passes by {uncovered:.0%} of the points"),
+        (uncovered > UNCOVERED_SHARE, f"the mesh is not where {uncovered:.0%} of the points are"),
+        (uncovered > ELSEWHERE_SHARE, "the mesh is of something else: has it the same units and place?"),
         (tilted > TILTED_SHARE, f"the mesh is tilted at {tilted:.0%} of the points: thin walls, or noise"),
     )
 
@@ -97,11 +98,12 @@ def of_operators(rows: OperatorAgreement) -> tuple[str, ...]:
 
 
 def of_counts(skeletons: SkeletonAgreement, solid: Solid) -> tuple[str, ...]:
-    """What the solid has more or less of than the cloud's skeleton."""
-    parts, loops, told = skeletons.components[0], skeletons.loops[0], "{}: {} in the skeleton, {} in the mesh".format
+    """What the solid has more or less of than the cloud's skeleton; one that is open may have a handle cut open."""
+    (parts, their_parts), (loops, their_loops) = skeletons.components, skeletons.loops
+    told, closed = "{}: {} in the skeleton, {} in the mesh".format, solid.is_watertight
     return _wrong(
-        (parts != solid.n_solids, told("components", parts, solid.n_solids)),
-        (loops != solid.genus, told("loops", loops, solid.genus)),
+        (parts != solid.n_solids and (closed or parts != their_parts), told("components", parts, solid.n_solids)),
+        (loops != solid.genus and (closed or loops != their_loops), told("loops", loops, solid.genus)),
     )
 
 

@@ -100,8 +100,8 @@ def cross_check(cloud: Any, *, pipeline: Pipeline[Any] | str = "default", mesh: 
         ... | RingBuilder | Contractor | ... | Refiner; the mesh's has the same parameters but no reduction.
     mesh : {"auto", "poisson", "ball_pivoting"}, TriangleMesh, or (vertices, faces)
         "poisson" reconstructs a mesh with vertices of its own, "ball_pivoting" one with the cloud's points as vertices,
-        which tests the code more than the method. "auto" takes the triangles of `cloud` if it is a mesh that is not too
-        coarse, else "poisson". A mesh of the user's, in the cloud's units, has its edges halved where they are long.
+        which tests the code more than the method. "auto" takes the triangles of `cloud` if it has some that are not too
+        coarse, else "poisson". One of the user's is in the cloud's units.
 
     Returns
     -------
@@ -127,6 +127,8 @@ def cross_check(cloud: Any, *, pipeline: Pipeline[Any] | str = "default", mesh: 
     kinds = [type(stage) for stage in pipeline.stages]
     if RingBuilder not in kinds or Contractor not in kinds:
         raise InvalidParameterError(f"pipeline = {pipeline!r}: must have a RingBuilder and a Contractor")
+    if isinstance(mesh, str) and mesh not in MADE_BY:
+        raise InvalidParameterError(f"mesh = {mesh!r}: must be one of {MADE_BY}, a mesh, or (vertices, faces)")
     require("igl")  # before the work that it is for
     rings = kinds.index(RingBuilder)
     builder: Any = pipeline.stages[rings]
@@ -149,8 +151,7 @@ def cross_check(cloud: Any, *, pipeline: Pipeline[Any] | str = "default", mesh: 
     other = mesh_skeleton(whole, pipeline)
     at_all = dense.positions, dense.normals[dense.survivors]
     facts = agreement.mesh_facts(body, *at_all, skeleton.n_components, other.report.stop_reason)
-    step = COMPARISON_STEP * frame.diagonal * frame.scale
-    skeletons = compare_skeletons(skeleton, other, step)
+    skeletons = compare_skeletons(skeleton, other, COMPARISON_STEP * frame.diagonal * frame.scale)
     said = agreement.judge(rows, skeletons, body, facts)
     of_points = state.points, np.append(angle, np.nan)[state.survivor_of_point]
     return CrossCheck(*said, rows, skeletons, facts, *of_points, skeleton, other, whole, ours, theirs)
@@ -158,19 +159,18 @@ def cross_check(cloud: Any, *, pipeline: Pipeline[Any] | str = "default", mesh: 
 
 def _body(cloud: Any, mesh: Any, dense: Contraction, apart: float) -> Solid:
     """The mesh that is asked for, in the working frame; contracted points are so far apart."""
-    named = isinstance(mesh, str)
-    if named and mesh not in MADE_BY:
-        raise InvalidParameterError(f"mesh = {mesh!r}: must be one of {MADE_BY}, a mesh, or (vertices, faces)")
     own = None
-    if not named:
+    if not isinstance(mesh, str):
         if isinstance(mesh, tuple) and (len(mesh) != 2 or np.shape(mesh[1])[1:] != (3,)):
             raise InvalidParameterError("mesh: must be vertices (V, 3) and faces (F, 3), or a triangle mesh")
-        own = given(SurfaceMesh(*mesh) if isinstance(mesh, tuple) else mesh, dense.frame, apart)
-        low, high = box(dense.positions)
-        if own is not None and not (np.abs(box(own.vertices) - np.array([low, high])) < (high - low).max()).all():
+        mesh = surface_mesh(SurfaceMesh(*mesh) if isinstance(mesh, tuple) else mesh)
+        (low, high), (least, most) = box(dense.positions), box(dense.frame.into(mesh.vertices))
+        size, reach = (high - low).max(), np.maximum(low - least, most - high).max()
+        if len(mesh.triangles) and not (reach < size and (most - least).max() > size / 2):
             raise InvalidParameterError(
-                "mesh: is larger than the cloud, or elsewhere: has it the same units and place?"
+                "mesh: is larger or smaller than the cloud, or elsewhere: same units and place?"
             )
+        own = given(mesh, dense.frame, apart)
         if own is None:
             why = f"it has no triangles, or edges too long for points {apart * dense.frame.scale:.3g} apart"
             raise InvalidParameterError(f"mesh: {why}: remesh it, as by MeshLab's 'Isotropic Explicit Remeshing'")

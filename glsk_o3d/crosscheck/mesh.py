@@ -67,6 +67,5 @@ def mesh_state(solid: Solid) -> tuple[Contraction, np.ndarray]:
 def mesh_laplacian(vertices: np.ndarray, faces: np.ndarray, cap: float = WEIGHT_CAP) -> Any:
     """Twice ``igl.cotmatrix``, capped as `cotangent_laplacian` is, (n, n) csr_matrix."""
     igl = require("igl")
-    faces = faces[igl.doublearea(vertices, faces) > 0]  # igl would divide by them
-    laplacian = 2 * igl.cotmatrix(vertices, faces)
+    laplacian = 2 * igl.cotmatrix(vertices, faces[igl.doublearea(vertices, faces) > 0])  # it would divide by the others
     return (diags_array(cap / np.maximum(np.abs(laplacian.diagonal()), cap)) @ laplacian).tocsr()

@@ -98,7 +98,11 @@ class Solid:
         if len(faces) < MIN_POINTS:
             raise InvalidCloudError(f"only {len(faces)} triangles have an area: there is no surface to compare with")
         faces = igl.bfs_orient(faces)[0] if made_by == "given" else faces
-        vertices, faces, *_ = igl.remove_unreferenced(*igl.split_nonmanifold(vertices, faces)[:2])
+        vertices, faces, *_ = igl.split_nonmanifold(vertices, faces)
+        part = igl.facet_components(faces)[1]
+        area = np.bincount(part, igl.doublearea(vertices, faces))
+        large = (area >= (LEAST_PART * area.max() if made_by == "poisson" else 0))[part]
+        vertices, faces, *_ = igl.remove_unreferenced(vertices, faces[large])
         solid = cls(vertices, faces, made_by)
         inside_out = [part.is_cavity for part in solid.parts if part.volume is not None][:1] == [True]
         return cls(vertices, faces[:, ::-1].copy(), made_by) if inside_out else solid
@@ -116,8 +120,6 @@ def poisson(points: np.ndarray, outward: np.ndarray, apart: float) -> Solid:
     asked = dict(depth=0, width=cell, full_depth=FULL_DEPTH, linear_fit=True, n_threads=1)
     mesh, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, **asked)
     mesh.remove_vertices_by_mask(cKDTree(points).query(np.asarray(mesh.vertices))[0] > REACH * cell)
-    part, _, area = map(np.asarray, mesh.cluster_connected_triangles())
-    mesh.remove_triangles_by_mask((area < LEAST_PART * area.max(initial=0))[part])
     return Solid.of(mesh, "poisson")
 
 
@@ -130,10 +132,9 @@ def ball_pivoting(points: np.ndarray, outward: np.ndarray) -> Solid:
 
 
 def given(mesh: Any, frame: Frame, apart: float) -> Solid | None:
-    """A mesh of the user's in the working frame, simplified if it is much finer than the points are apart.
+    """A mesh of the user's in the working frame, simplified if much finer than the points, its edges halved if coarser.
 
-    Else all edges are halved until none is longer than three spacings. None if that makes too many, or if it has no
-    triangles; InvalidCloudError if it is no mesh.
+    None if that makes too many, or if it has no triangles; InvalidCloudError if it is no mesh.
     """
     vertices, triangles = surface_mesh(mesh)
     if len(triangles) == 0:

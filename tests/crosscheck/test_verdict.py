@@ -78,7 +78,7 @@ def test_what_is_said_of_each_difference(verdict, changes, reason):
 @pytest.mark.parametrize(
     ("fault", "reason"),
     [
-        ({"mesh": (0.011, 0.0)}, "passes by 1% of the points"),
+        ({"mesh": (0.011, 0.0)}, "not where 1% of the points are"),
         ({"mesh": (0.0, 0.13)}, "tilted at 13% of the points"),
         ({"stop": f"solve 3 {REFUSED}: it broke"}, "contraction failed: solve 3"),
         ({"solid": {"solids": 3, "watertight": False}}, "the mesh is in 3 parts"),
