@@ -12,7 +12,7 @@ import time
 from collections import Counter
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import open3d as o3d
@@ -20,13 +20,14 @@ import typer
 from _clouds import Case, cases
 from _runs import Folders, Jobs, Markdown, Output, Own, Shapes, Variants, application, run
 from _tables import good, grouped, number, present, save
+from glsk_bench.repeating import spread
 from glsk_bench.scoring import score
 from glsk_bench.truths import read_axis
 from scipy.optimize import minimize
 
 from glsk_o3d import read_cloud, skeletonize
 from glsk_o3d.crosscheck import cross_check
-from glsk_o3d.crosscheck.agreement import VERDICTS, WEIGHTS
+from glsk_o3d.crosscheck.agreement import VERDICTS, WEIGHTS, of_counts, of_limbs
 
 STEPS = (0, 0.25, 0.5, 0.75, 0.9, 0.96, 1)  # of the reliability table
 RIDGE = 0.05  # of the fit: what a weight costs
@@ -50,14 +51,16 @@ def checked(cloud: Case | Path | tuple[Path, dict, bool]) -> dict:
     told = check.to_dict() | dict(
         cpu=seconds[2] - seconds[1], ratio=(seconds[2] - seconds[1]) / (seconds[1] - seconds[0])
     )
+    differs, limbs = of_counts(check.skeletons, check.solid), of_limbs(check.skeletons)
+    facts = dict(solid=bool(differs), limbs=float(np.log1p(len(limbs))))
+    told["facts"] = {name: fact * (not check.mesh.faults) for name, fact in facts.items()}
     skeleton = check.skeleton
     if isinstance(cloud, Case):
         told["right"] = score(axis, skeleton.vertices, skeleton.edges).perfect
     elif not isinstance(cloud, Path):
-        known = cloud[1]
-        counts = (skeleton.n_components, skeleton.n_loops) == (known.get("components", 1), known["loops"])
-        low, high = known["ends"] or (0, np.inf)
-        told["right"] = bool((known["loops"] is None or counts) and low <= len(skeleton.leaves) <= high)
+        known = {name: cloud[1][name] for name in ("components", "loops", "ends") if name in cloud[1]}
+        found = spread([skeleton], 1.0, **known)
+        told["right"] = 0 not in (found["loops"], found["ends"])
     return told
 
 
@@ -87,8 +90,8 @@ def verdicts(
         if known["loops"] is not None or known["ends"] is not None:
             place = meshes / f"{known['name']}.ply"
             for poisson, name in enumerate(("by area", "evenly spaced")):
-                facts = dict(variant=name, shape=known["name"], family="meshes")
-                work.append((facts, ((place, known, bool(poisson)),)))
+                row = dict(variant=name, shape=known["name"], family="meshes")
+                work.append((row, ((place, known, bool(poisson)),)))
     rows = run(checked, work, jobs)
     save(output, rows)
     tell(rows, markdown)
@@ -100,7 +103,7 @@ def fit(
 ) -> None:
     """The weights of the probability, fitted to rows that `verdicts -o` has saved."""
     rows = [row for file in files for row in good(json.loads(file.read_text())["rows"])]
-    values = np.array([[1.0, *facts(row).values()] for row in rows])
+    values = np.array([[1.0, row["facts"]["solid"], row["facts"]["limbs"], row["skeletons"]["doubt"]] for row in rows])
     right = np.array([row["right"] for row in rows])
 
     def loss(weights: np.ndarray) -> float:
@@ -110,15 +113,6 @@ def fit(
     weights = minimize(loss, np.zeros(len(FITTED))).x
     lines = [[name, number(found, 2), number(WEIGHTS[name], 1)] for name, found in zip(FITTED, weights, strict=True)]
     present([(f"{len(rows)} clouds", ["fact", "fitted", "in use"], lines)], markdown)
-
-
-def facts(row: dict[str, Any]) -> dict[str, float]:
-    """What the probability is made of; a mesh at fault says nothing of the solid and of limbs."""
-    found, solid = row["skeletons"], row["mesh"]
-    fault = bool(row["mesh"]["faults"])
-    counts = found["components"][0] == solid["solids"] and found["loops"][0] == solid["genus"]
-    limbs = float(np.log1p(len(found["missing"]) + len(found["extra"])))
-    return dict(solid=float(not fault and not counts), limbs=0.0 if fault else limbs, doubt=found["doubt"])
 
 
 def tell(rows: list[dict], markdown: bool) -> None:
@@ -133,14 +127,14 @@ def tell(rows: list[dict], markdown: bool) -> None:
             lines.append(
                 [f"{name} {variant}".removesuffix("_4096").strip(), *words, *(number(value, 2) for value in told)]
             )
-    noisy = [row["variant"].startswith("noise") for row in found]
+    noisy = np.array([row["variant"].startswith("noise") for row in found], bool)
     verdict, right = np.array([row["verdict"] for row in found]), np.array([row["right"] for row in found], bool)
     shares = {
         "of 'agrees' the graph is right": right[verdict == VERDICTS[0]],
         "of wrong graphs 'agrees'": (verdict == VERDICTS[0])[~right],
         "of right graphs 'agrees'": (verdict == VERDICTS[0])[right],
-        "of clean clouds 'cannot tell'": (verdict == VERDICTS[3])[~np.array(noisy, bool)],
-        "of noisy clouds 'cannot tell'": (verdict == VERDICTS[3])[np.array(noisy, bool)],
+        "of clean clouds 'cannot tell'": (verdict == VERDICTS[3])[~noisy],
+        "of noisy clouds 'cannot tell'": (verdict == VERDICTS[3])[noisy],
     }
     promises = [
         [name, str(len(held)), number(100 * held.mean(), 1) if len(held) else "-"] for name, held in shares.items()
@@ -182,19 +176,7 @@ def scans(
     """What the check says of some scans."""
     rows = run(checked, [(dict(cloud=path.stem), (path,)) for path in files], jobs)
     save(output, rows)
-    header = [
-        "cloud",
-        "points",
-        "CPU s",
-        "angle",
-        "eigenvalues",
-        "apart",
-        "loops",
-        "genus",
-        "parts",
-        "probability",
-        "note",
-    ]
+    header = ["cloud", "points", "CPU s", "angle", "eigenvalues", "apart", "loops", "genus", "parts", "probability"]
     lines = []
     for row in rows:
         if "failure" in row:
@@ -202,18 +184,9 @@ def scans(
             continue
         values = [number(pick(row), 2) for name, pick in PICKED.items() if name != "CPU ratio"]
         mesh = [str(row["skeletons"]["loops"][0]), str(row["mesh"]["genus"]), str(row["mesh"]["solids"])]
-        lines.append(
-            [
-                row["cloud"],
-                str(row["points"]["given"]),
-                number(row["cpu"], 1),
-                *values,
-                *mesh,
-                number(row["probability"], 2),
-            ]
-            + [row["verdict"]]
-        )
-    present([("Cross-checks", header, lines)], markdown)
+        first = [row["cloud"], str(row["points"]["given"]), number(row["cpu"], 1)]
+        lines.append([*first, *values, *mesh, number(row["probability"], 2), row["verdict"]])
+    present([("Cross-checks", [*header, "note"], lines)], markdown)
 
 
 if __name__ == "__main__":

@@ -24,10 +24,13 @@ class Question(NamedTuple):
 
     def probability(self, facts: Mapping[str, float]) -> float:
         """What the weighted sum of some facts stands for."""
-        total = self.weights["constant"] + sum(
-            weight * facts[name] for name, weight in self.weights.items() if name != "constant"
-        )
-        return float(1 / (1 + np.exp(-np.clip(total, -50, 50))))
+        return logistic(self.weights, facts)
+
+
+def logistic(weights: Mapping[str, float], facts: Mapping[str, float]) -> float:
+    """The probability of a logistic model with weights of facts and of a constant."""
+    total = weights["constant"] + sum(weight * facts[name] for name, weight in weights.items() if name != "constant")
+    return float(1 / (1 + np.exp(-np.clip(total, -50, 50))))
 
 
 # All weights are fitted, by benchmarks/calibrate.py on random shapes and things as scanners see them; docs/method.md

@@ -38,7 +38,6 @@ def crosscheck(
     the scan, and both with the mesh's handles. The verdict is one of 'agrees', 'agrees in part', 'do not trust' and
     'cannot tell', where the mesh is at fault.
     """
-    from .. import read_cloud
     from ..crosscheck import cross_check
     from ..crosscheck.check import MADE_BY
     from ..interop.clouds import SurfaceMesh
@@ -59,7 +58,7 @@ def crosscheck(
     with progress() as update:
         update(f"reading {scan.name}")
         held = read_scan(scan)
-        cloud = SurfaceMesh(held.positions, held.triangles) if len(held.triangles) else read_cloud(scan)
+        cloud = SurfaceMesh(held.positions, held.triangles)
         surface = read_mesh(own) if own else mesh
         update("comparing with a mesh")
         check = cross_check(cloud, pipeline=chosen, mesh=surface)
@@ -71,25 +70,26 @@ def crosscheck(
 def _told(check: Any) -> dict[str, Any]:
     """The facts that people read: without eigenvalues, places that the reasons have, and all but the largest parts."""
     facts = check.to_dict()
-    rows, skeletons, mesh = facts["rows"], facts["skeletons"], facts["mesh"]
+    mesh, skeletons = facts["mesh"], _without(facts["skeletons"], "missing", "extra", "closest_call")
     parts = [value_in_words(part, 4) for part in mesh["parts"][:MOST_PARTS]]
     more = len(mesh["parts"]) - len(parts)
-    for told, names in ((rows, ["eigenvalues"]), (skeletons, ["missing", "extra", "closest_call"])):
-        for name in names:
-            del told[name]
     return {
         "because": facts["reasons"],
         "worth": MEANINGS[check.verdict],
         "probability": round(check.probability, 3),
         "points": facts["points"],
-        "mesh": {name: value for name, value in mesh.items() if name not in ("parts", "faults")},
+        "mesh": _without(mesh, "parts", "faults"),
         "parts": [*parts, f"and {more} more"] if more else parts,
-        "laplacians": rows,
+        "laplacians": _without(facts["rows"], "eigenvalues"),
         "skeletons": {
             name: f"{value[0]} and {value[1]}" if isinstance(value, tuple) else value
             for name, value in skeletons.items()
         },
     }
+
+
+def _without(told: dict[str, Any], *names: str) -> dict[str, Any]:
+    return {name: value for name, value in told.items() if name not in names}
 
 
 def _save_angles(check: Any, path: Path) -> None:

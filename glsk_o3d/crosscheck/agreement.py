@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import expit
 
 from ..analysis.agreement import OperatorAgreement, SkeletonAgreement
-from ..decisions import coordinates
+from ..decisions import coordinates, logistic
 from ..interop.packages import require
 from ..numerics.neighbourhoods import spacing
 from ..numerics.vectors import dot
@@ -54,13 +53,12 @@ def judge(
     Where the mesh is at fault, what it says is not counted.
     """
     counts, limbs, operators = of_counts(skeletons, solid), of_limbs(skeletons), of_operators(rows)
-    by_itself = WEIGHTS["constant"] + WEIGHTS["doubt"] * skeletons.doubt
-    by_mesh = WEIGHTS["operators"] * bool(operators) + WEIGHTS["solid"] * bool(counts)
-    by_mesh += WEIGHTS["limbs"] * np.log1p(len(limbs))
-    probability = float(expit(by_itself + (0 if mesh.faults else by_mesh)))
+    doubt, trusted = {"doubt": skeletons.doubt}, float(not mesh.faults)
+    facts = dict(operators=bool(operators), solid=bool(counts), limbs=float(np.log1p(len(limbs))))
+    probability = logistic(WEIGHTS, {name: trusted * fact for name, fact in facts.items()} | doubt)
     folded = _wrong((rows.folded > 0, f"rings that do not go once around their point: {rows.folded}"))
     reasons = [*folded, *mesh.faults, *operators, *counts, *limbs]
-    if skeletons.closest_call and expit(by_itself) < CERTAIN:
+    if skeletons.closest_call and logistic(WEIGHTS, dict.fromkeys(facts, 0.0) | doubt) < CERTAIN:
         reasons.append(f"whether the branch at ({coordinates(skeletons.closest_call)}) is a limb is a close call")
     differs = bool(operators or counts or limbs)
     both = len({*skeletons.components}) == 1 == len({*skeletons.loops})

@@ -104,7 +104,7 @@ class Solid:
         large = (area >= (LEAST_PART * area.max() if made_by == "poisson" else 0))[part]
         vertices, faces, *_ = igl.remove_unreferenced(vertices, faces[large])
         solid = cls(vertices, faces, made_by)
-        inside_out = [part.is_cavity for part in solid.parts if part.volume is not None][:1] == [True]
+        inside_out = next((part.is_cavity for part in solid.parts if not part.borders), False)
         return cls(vertices, faces[:, ::-1].copy(), made_by) if inside_out else solid
 
 

@@ -117,7 +117,7 @@ class Layer:
             report = skeleton.report
             found |= {"iterations": len(report.iterations), "converged": report.converged}
             found |= {"stop_reason": report.stop_reason, "warnings": list(report.warnings)}
-        elif self.colors is not None and self.scalars is not None and not self.told:
+        elif self.colors is not None and self.scalars is not None:
             found["branches"] = int(self.scalars.max(initial=-1)) + 1
         return found
 

@@ -212,8 +212,7 @@ def support(report: Report) -> Markup:
 
 def told(heading: str, rows: Mapping[str, str]) -> Markup:
     """A section of names and texts."""
-    lines = [markup("<tr><td>{}</td><td>{}</td></tr>", *row) for row in rows.items()]
-    return markup('<h2>{}</h2><div class="run support"><table>{}</table></div>', heading, lines)
+    return markup("<h2>{}</h2>{}", heading, _table((), list(rows.items()), "support"))
 
 
 def origin(report: Report) -> Markup:
