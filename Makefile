@@ -7,8 +7,7 @@ PIP    := $(BIN)/python -m pip --disable-pip-version-check -qq
 # One BLAS thread per worker, because more only fight over the cores.
 PYTEST_ARGS ?= -n 2
 # What asks for the loops, ends and components that a pipeline finds, which no rounding may decide.
-GRAPH_TESTS := $(addprefix tests/,refinement samples editing test_connector.py test_lpr_reducer.py test_refiner.py \
-	test_sampler.py test_skeleton.py test_stability.py test_thinner.py)
+GRAPH_TESTS := $(addprefix tests/,curve samples editing filters data test_stability.py)
 # See benchmarks/README.md for what else there is.
 ACCURACY_ARGS ?= truth --builtin
 PEERS_ARGS ?= run benchmarks/results

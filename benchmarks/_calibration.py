@@ -16,7 +16,7 @@ from scipy.special import expit
 from scipy.stats import rankdata
 
 from glsk_o3d.analysis import compare
-from glsk_o3d.decisions import QUESTIONS as ASKED
+from glsk_o3d.data.decisions import QUESTIONS as ASKED
 from glsk_o3d.pipelines import default
 
 PENALTY = 1.0  # of half a weight's square, as if it were drawn from a normal distribution; the constant has none

@@ -21,9 +21,9 @@ from _tables import Table, Tables, good, keep, look, number, pick, sheet, short
 
 from glsk_o3d import Contractor, Pipeline, read_cloud
 from glsk_o3d.cli.overrides import override
+from glsk_o3d.data.report import REFUSED
 from glsk_o3d.interop.clouds import cloud_points
 from glsk_o3d.pipelines import default, wen2024
-from glsk_o3d.report import REFUSED
 
 BASES: dict[str, Callable[[], Pipeline]] = {"wen2024": wen2024, "default": default}
 WHOLE = ("cao2010", "wen2024", "default")

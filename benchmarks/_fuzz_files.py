@@ -15,11 +15,11 @@ import numpy as np
 
 import glsk_o3d as glsk
 from glsk_o3d import GlskError, samples
-from glsk_o3d.batch.inputs import find_inputs
-from glsk_o3d.batch.ledger import Ledger
+from glsk_o3d.apps.batch.inputs import find_inputs
+from glsk_o3d.apps.batch.ledger import Ledger
+from glsk_o3d.apps.meshlab.steps import read_steps
 from glsk_o3d.interop.packages import import_open3d
 from glsk_o3d.io.scans import read_scan
-from glsk_o3d.meshlab.steps import read_steps
 from glsk_o3d.recipes import load_recipe, save_recipe
 
 READERS: dict[str, Callable[[Path], object]] = {

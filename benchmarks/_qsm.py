@@ -11,7 +11,7 @@ import typer
 from scipy.io import loadmat
 
 from glsk_o3d.analysis.forestry import BREAST_HEIGHT
-from glsk_o3d.numerics.vectors import norm
+from glsk_o3d.geometry.vectors import norm
 
 MATRIX_STRUCTS = ("OptQSM", "QSM")  # of TreeQSM's .mat, each with a struct called cylinder
 # published: the columns of TreeQSM's text, which has one name for each three of them (TreeQSM's manual)

@@ -17,14 +17,14 @@ from scipy.spatial.distance import cdist
 from glsk_o3d import Pipeline, Refiner
 from glsk_o3d.analysis import Truth
 from glsk_o3d.analysis.comparison import TIP_REACH
-from glsk_o3d.numerics.cycles import minimum_cycle_basis
-from glsk_o3d.numerics.vectors import norm
-from glsk_o3d.refinement.air import branch_facts
-from glsk_o3d.refinement.bridging import gap_facts
-from glsk_o3d.refinement.evidence import Evidence, in_order
-from glsk_o3d.refinement.loops import loop_facts
-from glsk_o3d.refinement.spurs import limb_facts
-from glsk_o3d.skeleton import Skeleton
+from glsk_o3d.curve.topology.air import branch_facts
+from glsk_o3d.curve.topology.evidence import Evidence, in_order
+from glsk_o3d.curve.topology.gaps import gap_facts
+from glsk_o3d.curve.topology.loops import loop_facts
+from glsk_o3d.curve.topology.spurs import limb_facts
+from glsk_o3d.data.skeleton import Skeleton
+from glsk_o3d.geometry.cycles import minimum_cycle_basis
+from glsk_o3d.geometry.vectors import norm
 
 DIGITS = 4  # of a fact
 STEP = 0.3  # between places on the true axis, in median radii

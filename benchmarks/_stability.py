@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from glsk_o3d import Contractor, LPRReducer, Pipeline
 from glsk_o3d.cli.overrides import override
-from glsk_o3d.numerics.polylines import nearest_on_edges
+from glsk_o3d.geometry.polylines import nearest_on_edges
 from glsk_o3d.pipelines import rings
 
 

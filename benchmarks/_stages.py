@@ -36,9 +36,9 @@ from glsk_bench.scanning import depth_image, places_at
 from glsk_bench.shapes import shape
 
 from glsk_o3d import Pipeline, SkeletonWarning, skeletonize
-from glsk_o3d.batch import Skeletonizer
-from glsk_o3d.numerics.cores import cores
-from glsk_o3d.skeleton import ARRAYS
+from glsk_o3d.apps.batch import Skeletonizer
+from glsk_o3d.data.skeleton import ARRAYS
+from glsk_o3d.geometry.cores import cores
 
 MIDDLE = (4096, 65536)  # sizes of the second growth exponent
 COUNTS = ("iterations", "contracted", "vertices")

@@ -38,27 +38,29 @@ class Stage(NamedTuple):
 
 
 STAGES = {
-    "order": Stage("numerics.morton:morton_order"),
-    "kNN": Stage("numerics.neighbourhoods:nearest_neighbours,nearest_left"),
-    "outliers, noise": Stage("outlier_remover:inliers points:noise_share denoiser:average_noisy,subspace_mean_shift"),
-    "planes": Stage("numerics.neighbourhoods:principal"),
-    "thinning": Stage("numerics.grid_sampling:sample_grid thinner:thin,spacing_enough,thin_nearer"),
-    "rings": Stage("numerics.rings:star_rings"),
+    "order": Stage("geometry.morton:morton_order"),
+    "kNN": Stage("geometry.neighbourhoods:nearest_neighbours,nearest_left"),
+    "outliers, noise": Stage(
+        "filters.outlier_remover:inliers data.points:noise_share filters.denoiser:average_noisy,subspace_mean_shift"
+    ),
+    "planes": Stage("geometry.neighbourhoods:principal"),
+    "thinning": Stage("geometry.grid_sampling:sample_grid filters.thinner:thin,spacing_enough,thin_nearer"),
+    "rings": Stage("geometry.rings:star_rings"),
     "rest of the rings": Stage(
-        "sampler:Sampler._run outlier_remover:OutlierRemover._run denoiser:Denoiser._run thinner:Thinner._run "
-        "ring_builder:RingBuilder._run",
+        "filters.sampler:Sampler._run filters.outlier_remover:OutlierRemover._run filters.denoiser:Denoiser._run "
+        "filters.thinner:Thinner._run filters.ring_builder:RingBuilder._run",
         open=True,
     ),
-    "Laplacian": Stage("numerics.cotangent:cotangent_laplacian"),
-    "lines": Stage("contractor:explained_variance"),
-    "normal matrix": Stage("numerics.solver:solve_contraction", open=True),
-    "factorisation": Stage("numerics.solver:factorised"),
+    "Laplacian": Stage("geometry.cotangent:cotangent_laplacian"),
+    "lines": Stage("filters.contractor:explained_variance"),
+    "normal matrix": Stage("geometry.solver:solve_contraction", open=True),
+    "factorisation": Stage("geometry.solver:factorised"),
     "refinement of the solve": Stage(after=("normal matrix", "factorisation"), open=True),
-    "LPR": Stage("lpr_reducer:LPRReducer._run"),
-    "rest of the contraction": Stage("contractor:Contractor._run", open=True),
-    "sampling": Stage("connector:contraction_distance numerics.farthest_point:farthest_point_sampling"),
-    "connection": Stage("connector:Connector._run", open=True),
-    "refinement of the graph": Stage("refiner:Refiner._run"),
+    "LPR": Stage("filters.lpr_reducer:LPRReducer._run"),
+    "rest of the contraction": Stage("filters.contractor:Contractor._run", open=True),
+    "sampling": Stage("filters.connector:contraction_distance geometry.farthest_point:farthest_point_sampling"),
+    "connection": Stage("filters.connector:Connector._run", open=True),
+    "refinement of the graph": Stage("filters.refiner:Refiner._run"),
 }
 """The stages in the order of the tables, and the functions that do their work: to be kept as the package is."""
 SHARES = {

@@ -20,8 +20,8 @@ from rich import table as rich_table
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 
+from glsk_o3d.data.report import Report
 from glsk_o3d.interop.atomic import write_atomically
-from glsk_o3d.report import Report
 from glsk_o3d.viewing.figures import INK, save_figure
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -22,7 +22,7 @@ from glsk_o3d import Skeleton, pipelines, read_cloud, samples
 from glsk_o3d.analysis import cylinders, tree_measures
 from glsk_o3d.analysis.curves import distances
 from glsk_o3d.analysis.forestry import BREAST_HEIGHT
-from glsk_o3d.numerics.vectors import dot, norm, unit
+from glsk_o3d.geometry.vectors import dot, norm, unit
 from glsk_o3d.recipes.catalogue import named_pipeline
 from glsk_o3d.samples.capsules import visible
 

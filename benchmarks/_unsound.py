@@ -17,10 +17,10 @@ import numpy as np
 
 import glsk_o3d as glsk
 from glsk_o3d import GlskError, Skeleton, SkeletonWarning, analysis, editing, samples
+from glsk_o3d.analysis.support import with_support
+from glsk_o3d.data.skeleton import ARRAYS
 from glsk_o3d.io.formats.fields import FORMAT, FORMAT_VERSION, dumps
 from glsk_o3d.io.skeletons import FORMATS
-from glsk_o3d.resampling import with_support
-from glsk_o3d.skeleton import ARRAYS
 
 RARE = 0.1  # share of the cases in which what takes long is done
 NUMBERS = (math.nan, math.inf, -math.inf, -1.0, -0.0, 0.0, 5e-324, 1e-160, 0.5, 1.5, 1e149, 1e155, 1e308)

@@ -29,7 +29,7 @@ from _questions import questions
 from _runs import Jobs, Markdown, Output, Own, Shapes, Variants, application, run
 from _tables import fill, page_with, present, publish, read, save
 
-from glsk_o3d.decisions import QUESTIONS
+from glsk_o3d.data.decisions import QUESTIONS
 from glsk_o3d.pipelines import default
 
 EVERY = "*_4096"

@@ -26,8 +26,8 @@ from glsk_bench.truths import read_axis
 from scipy.optimize import minimize
 
 from glsk_o3d import read_cloud, skeletonize
-from glsk_o3d.crosscheck import cross_check
-from glsk_o3d.crosscheck.agreement import VERDICTS, WEIGHTS, of_counts, of_limbs
+from glsk_o3d.apps.crosscheck import cross_check
+from glsk_o3d.apps.crosscheck.agreement import VERDICTS, WEIGHTS, of_counts, of_limbs
 
 STEPS = (0, 0.25, 0.5, 0.75, 0.9, 0.96, 1)  # of the reliability table
 RIDGE = 0.05  # of the fit: what a weight costs

@@ -35,7 +35,15 @@ TIMED = ("clean", "depth2")  # of the first shape of each family
 KEPT_AFTER = 20  # skeletons, so that little is lost when a run is stopped
 PRELOADED = (  # by all processes at once, since imports take longer than some skeletons
     *("glsk_o3d.pipelines", "glsk_bench.scoring", "glsk_bench.making", "glsk_bench.table"),
-    *("glsk_o3d.refiner", "glsk_o3d.io.scans", "glsk_o3d.viewing.preview", "open3d", "typer", "trimesh", "skeletor"),
+    *(
+        "glsk_o3d.filters.refiner",
+        "glsk_o3d.io.scans",
+        "glsk_o3d.viewing.preview",
+        "open3d",
+        "typer",
+        "trimesh",
+        "skeletor",
+    ),
     *("pc_skeletor", "pygel3d.graph", "compas_cgal.skeletonization", "compas_cgal.meshing", "skan"),
 )
 IMAGES = ROOT / "docs" / "images"

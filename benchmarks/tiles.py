@@ -24,7 +24,7 @@ from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton, read_skeleton, samples
 from glsk_o3d.analysis.curves import along, pieces
-from glsk_o3d.batch.grid import Grid
+from glsk_o3d.apps.batch.grid import Grid
 
 COLUMNS, ROWS, ROOM = 10, 5, 1.8  # objects along x and y, and their distance
 ON_SEAMS = ((3, 6), (1, 3))  # columns that stand exactly on a seam, and rows: four objects stand on corners of tiles

@@ -42,7 +42,7 @@ nitpicky = True
 nitpick_ignore = [
     ("py:class", "pymeshlab.pmeshlab.MeshSet"),
     ("py:class", "glsk_o3d.analysis.rows.Rows"),  # of the tables
-    ("py:class", "glsk_o3d.points.Representatives"),  # of Points and Contraction
+    ("py:class", "glsk_o3d.data.points.Representatives"),  # of Points and Contraction
     ("py:obj", "glsk_o3d.pipeline.Produced"),  # a type variable
 ]
 default_role = "autolink"

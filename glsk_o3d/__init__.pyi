@@ -1,15 +1,19 @@
 # The public names and where they live; the package imports each when it is first asked for.
 from . import analysis as analysis
-from . import batch as batch
-from . import crosscheck as crosscheck
 from . import editing as editing
 from . import pipelines as pipelines
 from . import samples as samples
-from .connector import Connector
-from .contractor import Contractor
-from .decisions import Decision, Supported
-from .denoiser import Denoiser
-from .driver import remove_redundant_points, skeletonize
+from .analysis.support import support
+from .api import remove_redundant_points, skeletonize
+from .apps import batch as batch
+from .apps import crosscheck as crosscheck
+from .apps.meshlab.layers import to_pymeshlab
+from .apps.meshlab.meshset import MeshSet
+from .data.contraction import Contraction
+from .data.decisions import Decision, Supported
+from .data.points import Points
+from .data.report import IterationRecord, Report
+from .data.skeleton import Skeleton
 from .errors import (
     BatchError,
     DisplayError,
@@ -24,7 +28,18 @@ from .errors import (
     SkeletonWarning,
     StageError,
 )
-from .inscriber import Inscriber
+from .filters.connector import Connector
+from .filters.contractor import Contractor
+from .filters.denoiser import Denoiser
+from .filters.inscriber import Inscriber
+from .filters.lpr_reducer import LPRReducer
+from .filters.outlier_remover import OutlierRemover
+from .filters.refiner import Refiner
+from .filters.ring_builder import RingBuilder
+from .filters.sampler import Sampler
+from .filters.stopping import ExplainedScore, RingSizeRatio
+from .filters.thinner import Thinner
+from .filters.tracer import Tracer
 from .interop.clouds import Cloud
 from .io.annotation import annotate
 from .io.formats.gltf import save_rig
@@ -32,23 +47,8 @@ from .io.geometry import to_line_set, to_tubes
 from .io.scans import read_cloud, read_tensor_cloud
 from .io.skeletons import read_skeleton, read_truth, save_skeleton
 from .io.streaming import annotate_file, read_sample
-from .lpr_reducer import LPRReducer
-from .meshlab.layers import to_pymeshlab
-from .meshlab.meshset import MeshSet
-from .outlier_remover import OutlierRemover
 from .pipeline import Filter, Pipeline
-from .points import Points
 from .recipes import from_recipe, load_recipe, save_recipe, to_recipe
-from .refiner import Refiner
-from .report import IterationRecord, Report
-from .resampling import support
-from .ring_builder import RingBuilder
-from .sampler import Sampler
-from .skeleton import Skeleton
-from .state import Contraction
-from .stopping import ExplainedScore, RingSizeRatio
-from .thinner import Thinner
-from .tracer import Tracer
 from .viewing.page import save_report
 from .viewing.plot import plot_skeleton
 from .viewing.preview import save_preview

@@ -7,15 +7,15 @@ import numpy as np
 from scipy.sparse.csgraph import minimum_spanning_tree
 
 from .analysis.branches import branch_table
+from .curve.detail import with_limbs
+from .curve.thin.rooted import RootPlace, numbered_from, root_among
+from .curve.topology.collapse import merge_into, some_vertices
+from .data.skeleton import Skeleton, of_input
 from .errors import InvalidParameterError
-from .numerics.near_links import linked
-from .numerics.polylines import arc_lengths
-from .numerics.vectors import TINY, norm
+from .geometry.near_links import linked
+from .geometry.polylines import arc_lengths
+from .geometry.vectors import TINY, norm
 from .parameters import check_number
-from .refinement.detail import with_limbs
-from .refinement.merging import merge_into, some_vertices
-from .refinement.rooted import RootPlace, numbered_from, root_among
-from .skeleton import Skeleton, of_input
 
 __all__ = ["cut_loops", "detailed", "largest_component", "prune", "reroot", "simplify"]
 

@@ -10,13 +10,13 @@ from copy import copy, deepcopy
 from itertools import pairwise
 from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
 
+from .data.contraction import Contraction
+from .data.points import Points
+from .data.report import STOPPED_BY_CALLER, IterationRecord, Report, warn
+from .data.skeleton import Skeleton, of_input
 from .errors import GlskError, InvalidCloudError, InvalidParameterError, StageError, did_you_mean
 from .interop.clouds import Cloud, cloud_points
 from .parameters import UNWRITTEN, Parameters, is_own
-from .points import Points
-from .report import STOPPED_BY_CALLER, IterationRecord, Report, warn
-from .skeleton import Skeleton, of_input
-from .state import Contraction
 
 OnIteration: TypeAlias = Callable[[IterationRecord], bool | None]
 OnState: TypeAlias = Callable[[Contraction], object]

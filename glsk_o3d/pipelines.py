@@ -3,23 +3,23 @@
 from collections.abc import Callable
 from typing import Any
 
-from .connector import Connector
-from .contractor import Contractor
-from .denoiser import Denoiser
-from .inscriber import Inscriber
-from .lpr_reducer import LPRReducer
-from .outlier_remover import OutlierRemover
+from .curve.topology.evidence import ENOUGH_POINTS
+from .data.contraction import Contraction
+from .data.skeleton import Skeleton
+from .filters.connector import Connector
+from .filters.contractor import Contractor
+from .filters.denoiser import Denoiser
+from .filters.inscriber import Inscriber
+from .filters.lpr_reducer import LPRReducer
+from .filters.outlier_remover import OutlierRemover
+from .filters.refiner import Refiner
+from .filters.ring_builder import RingBuilder
+from .filters.sampler import Sampler
+from .filters.stopping import ExplainedScore, RingSizeRatio
+from .filters.thinner import Thinner
+from .filters.tracer import Tracer
 from .parameters import Parameters
 from .pipeline import Pipeline
-from .refinement.evidence import ENOUGH_POINTS
-from .refiner import Refiner
-from .ring_builder import RingBuilder
-from .sampler import Sampler
-from .skeleton import Skeleton
-from .state import Contraction
-from .stopping import ExplainedScore, RingSizeRatio
-from .thinner import Thinner
-from .tracer import Tracer
 
 
 def cao2010() -> Pipeline[Skeleton]:

@@ -23,10 +23,10 @@ from hypothesis import HealthCheck, settings
 from typer.testing import CliRunner
 
 from glsk_o3d import save_skeleton
+from glsk_o3d.data.report import IterationRecord, Report
+from glsk_o3d.data.skeleton import Skeleton
+from glsk_o3d.filters.ring_builder import RingBuilder
 from glsk_o3d.recipes.plugins import forget_plugins
-from glsk_o3d.report import IterationRecord, Report
-from glsk_o3d.ring_builder import RingBuilder
-from glsk_o3d.skeleton import Skeleton
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -428,5 +428,5 @@ def at_once(monkeypatch):
         def close(self, *, at_once):
             pass
 
-    monkeypatch.setattr("glsk_o3d.batch.run.LocalWorkers", Here)
+    monkeypatch.setattr("glsk_o3d.apps.batch.run.LocalWorkers", Here)
     return counts

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from glsk_o3d import Denoiser, OutlierRemover, Thinner, Tracer, pipelines, read_cloud
-from glsk_o3d.batch import run_batch
+from glsk_o3d.apps.batch import run_batch
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.samples import torus
 

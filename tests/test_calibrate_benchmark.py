@@ -7,7 +7,7 @@ import pytest
 from scipy.special import expit
 
 from glsk_o3d.analysis import Truth
-from glsk_o3d.decisions import QUESTIONS
+from glsk_o3d.data.decisions import QUESTIONS
 from glsk_o3d.pipelines import default
 from glsk_o3d.samples import y_junction
 

@@ -11,13 +11,13 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PACKAGE, BENCHMARK = ROOT / "glsk_o3d", ROOT / "benchmarks" / "src" / "glsk_bench"
 ROOMS = (
-    *(PACKAGE / name for name in ("numerics", "refinement", "analysis", "crosscheck")),
+    *(PACKAGE / name for name in ("geometry", "curve", "analysis", "apps/crosscheck")),
     *(BENCHMARK, BENCHMARK / "shapes", BENCHMARK / "shapes" / "things"),
 )
 sys.path.insert(0, str(ROOT / "docs" / "_ext"))
 steering = importlib.import_module("steering")
 sys.path.pop(0)
-NUMERIC = sorted({*steering.files(), *(path for room in ROOMS for path in room.glob("*.py"))})
+NUMERIC = sorted({*steering.files(), *(path for room in ROOMS for path in room.rglob("*.py"))})
 MOST_STEERING = 129
 """Numbers that steer a skeleton, at most: a change that adds one takes one out."""
 

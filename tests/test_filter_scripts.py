@@ -7,9 +7,9 @@ import pytest
 
 import glsk_o3d
 from glsk_o3d import samples
-from glsk_o3d.meshlab.script import comment
-from glsk_o3d.meshlab.steps import read_steps, scripts
-from glsk_o3d.meshlab.verbs import verbs
+from glsk_o3d.apps.meshlab.script import comment
+from glsk_o3d.apps.meshlab.steps import read_steps, scripts
+from glsk_o3d.apps.meshlab.verbs import verbs
 
 pymeshlab = pytest.importorskip("pymeshlab")
 

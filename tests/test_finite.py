@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from glsk_o3d import InvalidCloudError, Skeleton, Tracer, pipelines, refiner, samples
-from glsk_o3d.refinement.junctions import meet
-from glsk_o3d.refinement.limbs import Line
+from glsk_o3d.curve.shape.junctions import meet
+from glsk_o3d.curve.topology.limbs import Line
 
 pytestmark = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
 UNKNOWN = {"normals": "points without one", "support": "not measured", "points": "checked where they come in"}

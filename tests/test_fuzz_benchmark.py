@@ -5,8 +5,8 @@ import pytest
 import typer
 
 from glsk_o3d import Report, Skeleton, skeletonize
+from glsk_o3d.data.skeleton import ARRAYS as ARRAYS_OF_SKELETONS
 from glsk_o3d.samples import torus
-from glsk_o3d.skeleton import ARRAYS as ARRAYS_OF_SKELETONS
 
 TOOL = "fuzz"
 

@@ -14,11 +14,11 @@ import pytest
 from scipy.sparse import csr_matrix
 
 from glsk_o3d import Pipeline, pipelines
-from glsk_o3d.lpr_reducer import merge_energy
-from glsk_o3d.numerics.cotangent import cotangent_laplacian
-from glsk_o3d.numerics.neighbourhoods import nearest_neighbours
-from glsk_o3d.numerics.rings import Rings
-from glsk_o3d.ring_builder import published_k
+from glsk_o3d.filters.lpr_reducer import merge_energy
+from glsk_o3d.filters.ring_builder import published_k
+from glsk_o3d.geometry.cotangent import cotangent_laplacian
+from glsk_o3d.geometry.neighbourhoods import nearest_neighbours
+from glsk_o3d.geometry.rings import Rings
 
 GOLDEN = Path(__file__).parent / "golden"
 *PREPARE, WEN = pipelines.wen2024().stages[:3]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d import Skeleton, pipelines
-from glsk_o3d.numerics.cores import cores
+from glsk_o3d.geometry.cores import cores
 from glsk_o3d.samples import sauropod
 
 TOOL = "speed"

@@ -12,7 +12,7 @@ import open3d as o3d
 
 import glsk_o3d as glsk
 from glsk_o3d import Connector, Contraction, Contractor, LPRReducer, Pipeline, Refiner, RingBuilder, Skeleton, pipelines
-from glsk_o3d.stopping import ExplainedScore
+from glsk_o3d.filters.stopping import ExplainedScore
 
 cloud = glsk.read_cloud("scan.ply")
 

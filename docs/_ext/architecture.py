@@ -14,27 +14,25 @@ PACKAGE = Path(__file__).resolve().parents[2] / "glsk_o3d"
 
 ROWS = (
     {"command line": ("cli", "__main__")},
-    {"batches": ("batch",), "MeshLab": ("meshlab",)},
-    {"cross-check": ("crosscheck",)},
-    {"pictures and windows": ("viewing",)},
-    {"files": ("io",), "driver": ("driver", "resampling")},
-    {"analysis": ("analysis", "editing"), "recipes and plugins": ("recipes",)},
+    {"applications": ("apps",)},
+    {"pictures and windows": ("viewing",), "files": ("io",)},
+    {"editing": ("editing",)},
+    {"analysis": ("analysis",)},
+    {"api": ("api",)},
+    {"recipes and plugins": ("recipes",)},
     {"named pipelines": ("pipelines",)},
-    {
-        "filters of points": ("sampler", "outlier_remover", "denoiser", "thinner", "ring_builder"),
-        "filters": ("inscriber", "contractor", "lpr_reducer", "connector", "refiner", "tracer", "stopping"),
-    },
-    {"refinement": ("refinement",), "pipeline": ("pipeline",)},
-    {"what filters share": ("parameters", "points", "state", "skeleton", "report", "decisions")},
-    {"numerics": ("numerics",), "other packages, and files": ("interop",), "samples": ("samples",)},
+    {"filters": ("filters",)},
+    {"curve": ("curve",), "pipeline": ("pipeline",)},
+    {"data": ("data",)},
+    {"parameters": ("parameters",), "samples": ("samples",)},
+    {"geometry": ("geometry",), "other packages, and files": ("interop",)},
     {"errors": ("errors",)},
 )
 """Boxes by row, users above the used, and the modules and packages in each."""
 
 ASIDE = {
-    **dict.fromkeys(("cross-check", "pictures and windows", "files", "analysis", "refinement", "numerics"), -3.3),
-    **{"MeshLab": 3.3, "filters of points": -2.5, "filters": 2.5},
-    **{"other packages, and files": 1.2, "samples": 3.7},
+    **dict.fromkeys(("pictures and windows", "pipeline", "samples"), 3.0),
+    "other packages, and files": 2.4,
 }
 """Where in the drawing the boxes are that are not in its middle."""
 

@@ -6,10 +6,12 @@ import re
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[2] / "glsk_o3d"
-ROOMS = ("numerics", "refinement")
+ROOMS = ("geometry", "curve")
 FILES = (
-    *("points", "sampler", "outlier_remover", "denoiser", "thinner", "ring_builder"),
-    *("inscriber", "contractor", "lpr_reducer", "stopping", "connector", "refiner", "tracer", "decisions"),
+    "data/points",
+    *(f"filters/{name}" for name in ("sampler", "outlier_remover", "denoiser", "thinner", "ring_builder", "inscriber")),
+    *(f"filters/{name}" for name in ("contractor", "lpr_reducer", "stopping", "connector", "refiner", "tracer")),
+    "data/decisions",
 )
 ORIGINS = ("published", "derived", "measured", "fitted", "speed", "precision", "warning")
 """Where numbers come from. Those for speed, such as the sizes of blocks, change no result, those of precision none when
@@ -75,7 +77,7 @@ def files():
     """The modules that are asked, those of the filters first."""
     return [
         *(PACKAGE / f"{name}.py" for name in FILES),
-        *(p for room in ROOMS for p in sorted((PACKAGE / room).glob("*.py"))),
+        *(p for room in ROOMS for p in sorted((PACKAGE / room).rglob("*.py"))),
     ]
 
 
@@ -103,7 +105,7 @@ def value_of(name, statement):
 
 def weights():
     """The weights of the four questions."""
-    from glsk_o3d.decisions import QUESTIONS
+    from glsk_o3d.data.decisions import QUESTIONS
 
     found = []
     for about, question in QUESTIONS.items():

@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import glsk_o3d as glsk
-from glsk_o3d.crosscheck import cross_check
+from glsk_o3d.apps.crosscheck import cross_check
 from glsk_o3d.samples import y_junction
 
 

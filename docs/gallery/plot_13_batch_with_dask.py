@@ -14,7 +14,7 @@ import open3d as o3d
 from distributed import Client, LocalCluster
 
 import glsk_o3d as glsk
-from glsk_o3d.batch import run_batch
+from glsk_o3d.apps.batch import run_batch
 from glsk_o3d.samples import SAMPLES
 
 # %%

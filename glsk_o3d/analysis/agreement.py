@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..decisions import Place
-from ..skeleton import Skeleton
+from ..data.decisions import Place
+from ..data.skeleton import Skeleton
 from .comparison import TIP_REACH, matched
 from .curves import distances
 

@@ -8,15 +8,15 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
+from ..data.points import surface_points
+from ..data.skeleton import Skeleton
 from ..errors import InvalidCloudError, InvalidParameterError
-from ..numerics.cycles import inscribed_circle, minimum_cycle_basis
-from ..numerics.frame import check_extent
-from ..numerics.groups import component_labels, group_median, group_sum
-from ..numerics.neighbourhoods import nearest_neighbours, plane_axes
-from ..numerics.polylines import arc_lengths, place_at
-from ..numerics.vectors import Floats, Ints
-from ..points import surface_points
-from ..skeleton import Skeleton
+from ..geometry.cycles import inscribed_circle, minimum_cycle_basis
+from ..geometry.frame import check_extent
+from ..geometry.groups import component_labels, group_median, group_sum
+from ..geometry.neighbourhoods import nearest_neighbours, plane_axes
+from ..geometry.polylines import arc_lengths, place_at
+from ..geometry.vectors import Floats, Ints
 
 CLUSTER_NEIGHBOURS = 16  # fitted: of each point, in the graph whose components are the clusters of a cloud
 MIN_SECTION_POINTS = 6  # fitted: below which a place counts as outside
@@ -88,7 +88,7 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
     Examples
     --------
     >>> from glsk_o3d.samples import tube
-    >>> from glsk_o3d.skeleton import Skeleton
+    >>> from glsk_o3d.data.skeleton import Skeleton
     >>> straight = tube(2000)
     >>> axis = Skeleton(straight.nodes, straight.edges, straight.radii, (), (), ())
     >>> found = assess(axis, straight.points)

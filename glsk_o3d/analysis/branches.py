@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from ..curve.thin.rooted import root_among
+from ..data.skeleton import Skeleton, check_skeleton
 from ..errors import InvalidParameterError
-from ..numerics.cycles import edges_on_cycles
-from ..numerics.polylines import arc_lengths, place_at, relative_distance
-from ..numerics.vectors import Floats, Ints, norm
-from ..refinement.rooted import root_among
-from ..skeleton import Skeleton, check_skeleton
+from ..geometry.cycles import edges_on_cycles
+from ..geometry.polylines import arc_lengths, place_at, relative_distance
+from ..geometry.vectors import Floats, Ints, norm
 from .rows import Rows
 from .segmentation import branch_of_point
 

@@ -7,9 +7,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
+from ..data.skeleton import Skeleton, check_skeleton
 from ..errors import InvalidParameterError
-from ..numerics.groups import component_labels
-from ..skeleton import Skeleton, check_skeleton
+from ..geometry.groups import component_labels
 from .curves import check_graph, places_along, simple_edges
 from .summary import structure
 

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..data.skeleton import Skeleton
 from ..errors import InvalidParameterError
-from ..numerics.vectors import norm
-from ..skeleton import Skeleton
+from ..geometry.vectors import norm
 
 MOST_ON_A_CURVE = 10**7  # derived: on a curve; the arrays of so many take a gigabyte
 

@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
+from ..data.skeleton import Skeleton
 from ..errors import SkeletonWarning
-from ..numerics.neighbourhoods import plane_axes
-from ..numerics.vectors import TINY, along_axis, norm
-from ..numerics.vectors import unit as directions
+from ..geometry.neighbourhoods import plane_axes
+from ..geometry.vectors import TINY, along_axis, norm
+from ..geometry.vectors import unit as directions
 from ..parameters import check_number
-from ..skeleton import Skeleton
 from .trees import Cylinders, cylinders, lowest_around, points_near, upward
 
 BREAST_HEIGHT = 1.3  # published: metres above the ground at which foresters measure stems

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import InvalidParameterError
-from ..numerics.vectors import norm
+from ..geometry.vectors import norm
 from .gripper import Gripper
 
 CELL_NEIGHBOURS = 8  # measured: of 1230 ways through sparse walls 11 seemed free with 4, 1 with 6, none with 8

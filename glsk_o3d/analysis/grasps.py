@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from ..data.points import surface_points
+from ..data.report import outside
+from ..data.skeleton import Skeleton
 from ..errors import InvalidParameterError, SkeletonWarning
-from ..numerics.groups import group_rank
-from ..numerics.polylines import arc_lengths
+from ..geometry.groups import group_rank
+from ..geometry.polylines import arc_lengths
 from ..parameters import check_number
-from ..points import surface_points
-from ..report import outside
-from ..skeleton import Skeleton
 from .curves import check_places
 from .grasp_checks import Ways, checked_plane, free_ways
 from .gripper import GraspCandidates, Gripper, listed

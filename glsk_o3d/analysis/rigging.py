@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array
 
-from ..numerics.groups import group_rank
-from ..numerics.polylines import arc_lengths, incident_edges, nearest_on_edges, place_at
-from ..numerics.vectors import TINY, norm
-from ..refinement.merging import merge_into
-from ..refinement.rooted import numbered_from
-from ..skeleton import Skeleton
+from ..curve.thin.rooted import numbered_from
+from ..curve.topology.collapse import merge_into
+from ..data.skeleton import Skeleton
+from ..geometry.groups import group_rank
+from ..geometry.polylines import arc_lengths, incident_edges, nearest_on_edges, place_at
+from ..geometry.vectors import TINY, norm
 from .segmentation import branch_of_edge
 
 MOST_WEIGHTS = 4  # published: glTF 2.0, 3.7.3.3, joints of a vertex in one set

@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..data.skeleton import Skeleton, check_skeleton
 from ..errors import InvalidCloudError, InvalidParameterError
+from ..geometry.polylines import nearest_on_edges
+from ..geometry.vectors import finite_rows
 from ..interop.clouds import cloud_points
-from ..numerics.polylines import nearest_on_edges
-from ..numerics.vectors import finite_rows
-from ..skeleton import Skeleton, check_skeleton
 from .curves import along, pieces
 
 PIECES_PER_CURVE = 4000  # fitted: that a curve is cut into, to find the one nearest to a point

@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from ..report import NOT_CONTRACTED, IterationRecord
-from ..skeleton import Skeleton
+from ..data.report import NOT_CONTRACTED, IterationRecord
+from ..data.skeleton import Skeleton
 
 ITERATION_COLUMNS = {
     "solve": ("iteration", "d"),

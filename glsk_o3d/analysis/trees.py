@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import InvalidParameterError
-from ..numerics.groups import Members
-from ..numerics.neighbourhoods import plane_axes
-from ..numerics.polylines import arc_lengths, place_at, relative_distance
-from ..numerics.vectors import AXES, Floats, along_axis, norm
-from ..numerics.vectors import unit as directions
+from ..geometry.groups import Members
+from ..geometry.neighbourhoods import plane_axes
+from ..geometry.polylines import arc_lengths, place_at, relative_distance
+from ..geometry.vectors import AXES, Floats, along_axis, norm
+from ..geometry.vectors import unit as directions
 from .branches import branch_table
 from .rows import Rows
 

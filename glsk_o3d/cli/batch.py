@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 from typer import Option
 
-from .. import batch as batches
+from ..apps import batch as batches
 from . import options
 from .console import echo, flags, print_rows, progress, say
 from .options import SKELETON_ENDINGS, argument, option, output_option

@@ -38,8 +38,8 @@ def crosscheck(
     the scan, and both with the mesh's handles. The verdict is one of 'agrees', 'agrees in part', 'do not trust' and
     'cannot tell', where the mesh is at fault.
     """
-    from ..crosscheck import cross_check
-    from ..crosscheck.check import MADE_BY
+    from ..apps.crosscheck import cross_check
+    from ..apps.crosscheck.check import MADE_BY
     from ..interop.clouds import SurfaceMesh
     from ..io.scans import read_mesh, read_scan
     from ..viewing.figures import printable

@@ -12,7 +12,7 @@ from .options import Where, argument
 from .outputs import tell
 
 if TYPE_CHECKING:
-    from ..skeleton import Skeleton
+    from ..data.skeleton import Skeleton
 
 FEW_VALUES = 12  # fitted: that an attribute may have for all of them to be listed
 SPACING_POINTS = 100_000  # precision: points whose nearest others say the spacing to half a percent
@@ -48,10 +48,10 @@ def _cloud_facts(file: Path, where: str | None) -> dict[str, Any]:
     """
     import numpy as np
 
+    from ..geometry.groups import first_in_their_place
+    from ..geometry.neighbourhoods import nearest_neighbours
     from ..io.scans import promised_points, read_blocks, read_scan
     from ..io.streaming import LARGE_CLOUD
-    from ..numerics.groups import first_in_their_place
-    from ..numerics.neighbourhoods import nearest_neighbours
 
     large = (promised_points(file) or 0) > LARGE_CLOUD
     n, lost, ends = 0, 0, []

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from typing import Any
 
-from ..driver import as_pipeline
+from ..api import as_pipeline
 from ..errors import InvalidParameterError, did_you_mean
 from ..parameters import Parameters
 from ..pipeline import Pipeline

@@ -24,9 +24,9 @@ def run(
 
     The whole script is checked before anything is run. It needs pymeshlab.
     """
-    from ..meshlab.layers import layer_endings
-    from ..meshlab.script import comment, scripts
-    from ..meshlab.steps import find_script, read_steps
+    from ..apps.meshlab.layers import layer_endings
+    from ..apps.meshlab.script import comment, scripts
+    from ..apps.meshlab.steps import find_script, read_steps
 
     if listed:
         found = {name: comment(path) for name, path in scripts().items()}
@@ -35,7 +35,7 @@ def run(
         return
     if script is None or scan is None:
         raise WrongUsage("a SCRIPT and a SCAN are needed: glsk run SCRIPT SCAN -o FILE, or --list")
-    from ..meshlab.meshset import MeshSet
+    from ..apps.meshlab.meshset import MeshSet
 
     steps = read_steps(find_script(script))
     makes = steps[-1].verb.makes if steps[-1].verb else "a skeleton, points or a mesh"

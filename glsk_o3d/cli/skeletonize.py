@@ -14,7 +14,7 @@ from .options import option, output_option
 from .outputs import Output, check_outputs, skeleton_outputs, tell, write_each
 
 if TYPE_CHECKING:
-    from ..skeleton import Skeleton
+    from ..data.skeleton import Skeleton
 
 
 def skeletonize(
@@ -43,9 +43,9 @@ def skeletonize(
     """
     from .. import annotate_file
     from ..analysis.summary import summary
+    from ..analysis.support import with_support
     from ..interop.packages import require
     from ..io.streaming import LABELLED_ENDING, points_for
-    from ..resampling import with_support
     from .overrides import choose
 
     chosen = choose(pipeline, settings, drop_invalid, sample)

@@ -6,9 +6,9 @@ import numpy as np
 
 from ..analysis.branches import branch_table
 from ..analysis.segmentation import branch_of_point, vertex_of_cloud
+from ..data.skeleton import Skeleton
 from ..interop.clouds import open3d_class
 from ..interop.packages import import_open3d
-from ..skeleton import Skeleton
 from .colors import ColorChoice, shades
 
 

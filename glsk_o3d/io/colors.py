@@ -6,8 +6,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from ..analysis.branches import branch_table
+from ..data.skeleton import Skeleton, as_color
 from ..interop.packages import require
-from ..skeleton import Skeleton, as_color
 
 ColorChoice: TypeAlias = Literal["branch", "order", "radius", "confidence", "support"] | Sequence[float]
 """What colours show, or one colour for all: red, green and blue from 0 to 1."""

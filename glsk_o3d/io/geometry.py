@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 
 from ..analysis.segmentation import branch_of_edge
+from ..data.skeleton import Skeleton, check_skeleton
 from ..errors import InvalidParameterError
+from ..geometry.neighbourhoods import plane_axes
+from ..geometry.vectors import TINY
 from ..interop.packages import import_open3d
-from ..numerics.neighbourhoods import plane_axes
-from ..numerics.vectors import TINY
 from ..parameters import check_number
-from ..skeleton import Skeleton, check_skeleton
 from .colors import ColorChoice, shades
 
 

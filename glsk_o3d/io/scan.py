@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from ..data.points import on_surface
+from ..data.report import warn
 from ..errors import InvalidParameterError, did_you_mean
+from ..filters.sampler import Sampler
 from ..interop.packages import import_open3d
-from ..points import on_surface
-from ..report import warn
-from ..sampler import Sampler
 
 COLOR_CHANNELS = ["red", "green", "blue"]
 NORMAL_NAMES = ["nx", "ny", "nz"]

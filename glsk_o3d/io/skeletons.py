@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..analysis.comparison import Truth
+from ..curve.thin.rooted import RootPlace
+from ..data.skeleton import Skeleton
 from ..errors import FileFormatError, brief
 from ..interop.atomic import existing_file, write_atomically
-from ..refinement.rooted import RootPlace
-from ..skeleton import Skeleton
 from .formats import fields, gltf, lines, ply, trees
 from .formats.graphs import NoEdges, as_forest, holding_all
 from .paths import SCAN_ENDINGS, unknown_ending

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 
 from ..analysis.segmentation import vertex_of_cloud
+from ..data.skeleton import Skeleton
 from ..errors import FileFormatError, InvalidCloudError
+from ..filters.sampler import Sampler
+from ..geometry.frame import not_finite
+from ..geometry.grid_sampling import sample_blocks
+from ..geometry.vectors import finite_rows
 from ..interop.atomic import check_ending, write_atomically
 from ..interop.clouds import SAMPLE_COUNT, CountedPoints, SurfaceMesh
-from ..numerics.frame import not_finite
-from ..numerics.grid_sampling import sample_blocks
-from ..numerics.vectors import finite_rows
 from ..parameters import check_number
 from ..pipeline import Pipeline
-from ..sampler import Sampler
-from ..skeleton import Skeleton
 from .annotation import labels
 from .formats import ply
 from .scan import COLOR_CHANNELS, Scan

@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from typing import Any
 
+from ..data.contraction import Contraction
 from ..errors import InvalidParameterError, did_you_mean
 from ..interop.packages import FILTER_GROUP, PIPELINE_GROUP
 from ..parameters import Parameters
 from ..pipeline import Filter, Pipeline
 from ..pipelines import BUILTIN, PIPELINES
-from ..state import Contraction
 from .plugins import plugins
 
 __all__ = ["catalogue", "known_pipelines", "named_pipeline"]

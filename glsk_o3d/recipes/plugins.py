@@ -7,13 +7,13 @@ from contextlib import redirect_stdout
 from importlib.metadata import EntryPoint
 from typing import Any
 
+from ..data.report import outside
 from ..errors import PluginWarning
 from ..interop.clouds import Cloud
 from ..interop.packages import FILTER_GROUP, entry_points
 from ..parameters import RESERVED_WORDS, Parameters
 from ..pipeline import FLOWS, Filter, Pipeline
 from ..pipelines import BUILTIN, PIPELINES
-from ..report import outside
 
 __all__ = ["forget_plugins"]
 

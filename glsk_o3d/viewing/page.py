@@ -15,13 +15,13 @@ import numpy as np
 
 from ..analysis.segmentation import branch_of_edge, branch_of_point, branch_of_vertex
 from ..analysis.summary import ITERATION_COLUMNS, iteration_rows
-from ..decisions import coordinates
+from ..curve.detail import all_limbs, pruning_order
+from ..data.decisions import coordinates
+from ..data.report import Markup, Report, markup
+from ..data.skeleton import Skeleton
 from ..interop.atomic import check_ending, write_atomically
 from ..interop.packages import require
 from ..io.colors import shades
-from ..refinement.detail import all_limbs, pruning_order
-from ..report import Markup, Report, markup
-from ..skeleton import Skeleton
 from .figures import MOST_DRAWN_POINTS, thinned
 from .preview import counts
 

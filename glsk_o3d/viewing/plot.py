@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 
 from ..analysis.segmentation import branch_of_edge
+from ..data.skeleton import Skeleton
 from ..errors import InvalidParameterError
 from ..interop.clouds import cloud_points
 from ..interop.packages import require
 from ..io.colors import shades
-from ..skeleton import Skeleton
 from .preview import ROOT_MARK
 
 _FAR_GREY, _NEAR_GREY = 0.93, 0.55  # of the farthest and of the nearest point

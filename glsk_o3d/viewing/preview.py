@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from ..analysis.summary import point_count, structure
+from ..data.report import Report
+from ..data.skeleton import Skeleton
 from ..errors import InvalidParameterError
+from ..geometry.vectors import norm
 from ..interop.atomic import check_ending
-from ..numerics.vectors import norm
-from ..report import Report
-from ..skeleton import Skeleton
 from . import figures
 from .figures import INK, PAPER
 

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from ..data.skeleton import Skeleton
 from ..errors import DisplayError
 from ..interop.clouds import to_point_cloud
 from ..interop.packages import import_open3d
 from ..io.geometry import to_line_set, to_tubes
-from ..skeleton import Skeleton
 
 WINDOW_KEYS = {"C": "cloud", "S": "skeleton", "T": "radius tubes"}
 CLOUD_GREY = (0.62, 0.64, 0.66)  # of points without a colour

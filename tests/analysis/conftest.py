@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from glsk_o3d.data.skeleton import Skeleton
 from glsk_o3d.samples import torus, tube
-from glsk_o3d.skeleton import Skeleton
 
 
 @pytest.fixture(scope="session")

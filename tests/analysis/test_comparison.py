@@ -10,9 +10,9 @@ from glsk_o3d import annotate, read_truth, save_skeleton, skeletonize, to_line_s
 from glsk_o3d.analysis import Truth, branch_table, compare, segment
 from glsk_o3d.analysis.comparison import matching_f1
 from glsk_o3d.analysis.curves import distances
+from glsk_o3d.data.skeleton import Skeleton
 from glsk_o3d.errors import FileFormatError, InvalidParameterError
 from glsk_o3d.samples import helix, sample_object, sphere, torus, tube, two_rings, y_junction
-from glsk_o3d.skeleton import Skeleton
 
 SAMPLES = [tube, torus, helix, y_junction, two_rings, sample_object]
 

@@ -8,7 +8,7 @@ import open3d as o3d
 import pytest
 
 from glsk_o3d import read_tensor_cloud
-from glsk_o3d.crosscheck import cross_check
+from glsk_o3d.apps.crosscheck import cross_check
 from glsk_o3d.samples import torus
 
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from glsk_o3d.analysis import assess, compare
+from glsk_o3d.data.skeleton import Skeleton
 from glsk_o3d.io.skeletons import save_skeleton
 from glsk_o3d.samples import torus
-from glsk_o3d.skeleton import Skeleton
 
 
 @pytest.fixture(scope="module")

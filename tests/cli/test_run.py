@@ -8,8 +8,8 @@ import pytest
 
 import glsk_o3d
 from glsk_o3d import read_cloud, read_skeleton
-from glsk_o3d.meshlab.layers import Layer
-from glsk_o3d.meshlab.steps import scripts
+from glsk_o3d.apps.meshlab.layers import Layer
+from glsk_o3d.apps.meshlab.steps import scripts
 
 pytest.importorskip("pymeshlab")
 OURS = '<FilterScript>\n<filter name="{}">\n{}\n</filter>\n</FilterScript>\n'

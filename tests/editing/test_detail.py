@@ -16,10 +16,10 @@ from glsk_o3d import (
     save_skeleton,
     skeletonize,
 )
-from glsk_o3d.decisions import Decision
+from glsk_o3d.data.decisions import Decision
+from glsk_o3d.data.skeleton import Skeleton
 from glsk_o3d.samples import torus, y_junction
 from glsk_o3d.samples.capsules import union_sample
-from glsk_o3d.skeleton import Skeleton
 
 
 @pytest.fixture(scope="module")

@@ -110,7 +110,7 @@ def test_counts_are_of_any_real_type(o3d):
 
 def test_an_array_does_not_import_open3d():
     code = (
-        "import sys, numpy, glsk_o3d.io.scans, glsk_o3d.io.annotation, glsk_o3d.meshlab.verbs\n"
+        "import sys, numpy, glsk_o3d.io.scans, glsk_o3d.io.annotation, glsk_o3d.apps.meshlab.verbs\n"
         "from glsk_o3d.interop.clouds import cloud_points\n"
         "cloud_points(numpy.ones((4, 3)))\n"
         "assert not {'open3d', 'pymeshlab', 'matplotlib', 'networkx'} & set(sys.modules)"

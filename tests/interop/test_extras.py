@@ -34,7 +34,7 @@ table.to_csv("branches.csv"), str(table), glsk.analysis.grasp_candidates(skeleto
 ASKS = """
 import json
 from pathlib import Path
-from glsk_o3d.crosscheck import cross_check
+from glsk_o3d.apps.crosscheck import cross_check
 for ending in ("las", "laz", "e57"):
     Path(f"scan.{ending}").write_bytes(b"any")
 asking = {

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from glsk_o3d.data.report import Report
+from glsk_o3d.data.skeleton import Skeleton
 from glsk_o3d.errors import FileFormatError
 from glsk_o3d.io.formats.graphs import as_forest, graph_skeleton
 from glsk_o3d.io.skeletons import FORMATS, READABLE, holds_skeleton, read_skeleton, save_skeleton
-from glsk_o3d.report import Report
-from glsk_o3d.skeleton import Skeleton
 
 
 @st.composite

@@ -24,7 +24,7 @@ from glsk_o3d import (
     samples,
     skeletonize,
 )
-from glsk_o3d.meshlab.verbs import verbs
+from glsk_o3d.apps.meshlab.verbs import verbs
 from glsk_o3d.pipeline import Filter
 from glsk_o3d.pipelines import PIPELINES
 from glsk_o3d.recipes import from_recipe, to_recipe
@@ -60,7 +60,7 @@ def test_on_the_command_line_and_in_a_script(tmp_path, monkeypatch):
     from glsk_o3d.cli.main import app
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("glsk_o3d.meshlab.steps.verbs", verbs.__wrapped__)  # not those of other tests
+    monkeypatch.setattr("glsk_o3d.apps.meshlab.steps.verbs", verbs.__wrapped__)  # not those of other tests
     np.savetxt("scan.xyz", POINTS)
     (tmp_path / "s.mlx").write_text(SCRIPT)
 

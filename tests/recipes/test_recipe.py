@@ -230,7 +230,7 @@ def test_a_class_of_another_module_is_named_with_it():
     assert recipe["pipeline"] == [{"filter": "Homemade", "from": __name__}]
     with pytest.raises(RecipeError, match=re.escape(f"install {__name__}")):
         from_recipe(recipe)
-    assert from_recipe(one("LPRReducer", **{"from": "glsk_o3d.lpr_reducer"})) == Pipeline(LPRReducer())
+    assert from_recipe(one("LPRReducer", **{"from": "glsk_o3d.filters.lpr_reducer"})) == Pipeline(LPRReducer())
     with pytest.raises(RecipeError, match=rf"^pipeline\[0\]\.from: .*{re.escape(__name__)}"):
         from_recipe(one("LPRReducer", **{"from": __name__}))
     namesake = dataclasses.make_dataclass("Refiner", [], bases=(Homemade,), frozen=True, kw_only=True)

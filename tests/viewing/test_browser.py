@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import glsk_o3d as glsk
-from glsk_o3d.report import Report
-from glsk_o3d.skeleton import Skeleton
+from glsk_o3d.data.report import Report
+from glsk_o3d.data.skeleton import Skeleton
 
 HOSTILE = "</title></script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&amp;{{data}}"
 TOO_WIDE = """[...document.querySelectorAll("body *")].filter((part) => !part.closest(".wide *"))

@@ -13,9 +13,9 @@ import pytest
 import glsk_o3d as glsk
 from glsk_o3d import save_report, to_line_set
 from glsk_o3d.analysis import segment
-from glsk_o3d.decisions import Decision, Supported
+from glsk_o3d.data.decisions import Decision, Supported
+from glsk_o3d.data.report import IterationRecord, Report
 from glsk_o3d.io.formats import fields
-from glsk_o3d.report import IterationRecord, Report
 from glsk_o3d.samples import torus
 from glsk_o3d.viewing import page as sections
 

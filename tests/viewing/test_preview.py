@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from glsk_o3d import Skeleton
-from glsk_o3d.decisions import Supported
+from glsk_o3d.data.decisions import Supported
+from glsk_o3d.data.report import Report
 from glsk_o3d.errors import FileFormatError
-from glsk_o3d.report import Report
 from glsk_o3d.viewing import preview
 from glsk_o3d.viewing.page import save_report
 from glsk_o3d.viewing.preview import save_preview

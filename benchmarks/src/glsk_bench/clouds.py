@@ -10,8 +10,8 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from glsk_o3d.errors import InvalidParameterError, did_you_mean
-from glsk_o3d.numerics.groups import component_labels
-from glsk_o3d.numerics.vectors import norm
+from glsk_o3d.geometry.groups import component_labels
+from glsk_o3d.geometry.vectors import norm
 from glsk_o3d.samples.capsules import checked_generator
 
 from .scanning import camera_places, depth_image, lidar_scan, seen_cosines

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from glsk_o3d.batch.workers import LocalWorkers, died
+from glsk_o3d.apps.batch.workers import LocalWorkers, died
 from glsk_o3d.errors import BatchError, InvalidParameterError, did_you_mean
-from glsk_o3d.numerics.cores import cores
+from glsk_o3d.geometry.cores import cores
 
 from . import versions
 from .folders import BenchmarkFolder, begun, write_axis, write_points

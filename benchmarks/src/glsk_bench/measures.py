@@ -21,10 +21,10 @@ from glsk_o3d.analysis.comparison import (
     nearest_pairs,
 )
 from glsk_o3d.analysis.curves import along, pieces, places_along, simple_edges
+from glsk_o3d.data.skeleton import Skeleton
 from glsk_o3d.errors import InvalidParameterError
-from glsk_o3d.numerics.polylines import arc_lengths, place_at
-from glsk_o3d.numerics.vectors import dot, norm, unit
-from glsk_o3d.skeleton import Skeleton
+from glsk_o3d.geometry.polylines import arc_lengths, place_at
+from glsk_o3d.geometry.vectors import dot, norm, unit
 
 from .truths import ThingTruth
 

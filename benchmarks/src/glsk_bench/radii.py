@@ -9,8 +9,8 @@ from scipy.spatial import cKDTree
 
 from glsk_o3d.analysis.curves import along, pieces
 from glsk_o3d.errors import InvalidParameterError
-from glsk_o3d.numerics.groups import group_median
-from glsk_o3d.numerics.vectors import TINY, dot, norm
+from glsk_o3d.geometry.groups import group_median
+from glsk_o3d.geometry.vectors import TINY, dot, norm
 
 NEAREST_PLACES = 20_000  # fitted: along an axis, among which the nearest is sought, and one for each edge
 LEAST_OWNERS = 3  # fitted: points that a radius is measured by, at least: one or two may be anything

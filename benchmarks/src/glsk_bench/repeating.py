@@ -14,9 +14,9 @@ from scipy.spatial import cKDTree
 from glsk_o3d.analysis.comparison import PLACE_SPACING
 from glsk_o3d.analysis.curves import places_along, simple_edges
 from glsk_o3d.analysis.summary import structure
+from glsk_o3d.data.skeleton import Skeleton
 from glsk_o3d.errors import InvalidParameterError
 from glsk_o3d.interop.atomic import write_json
-from glsk_o3d.skeleton import Skeleton
 
 from .folders import BenchmarkFolder, CloudFile
 from .measures import HOOK_ANGLE, last_turns

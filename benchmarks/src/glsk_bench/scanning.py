@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from glsk_o3d.errors import InvalidParameterError
-from glsk_o3d.numerics.vectors import dot, norm, unit
+from glsk_o3d.geometry.vectors import dot, norm, unit
 
 from .shapes import Shape
 from .shapes.curves import UP, direction

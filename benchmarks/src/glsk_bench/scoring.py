@@ -15,10 +15,10 @@ import numpy as np
 
 from glsk_o3d.analysis.comparison import PLACE_SPACING, Truth, compare
 from glsk_o3d.analysis.curves import check_graph, simple_edges
+from glsk_o3d.data.skeleton import Skeleton
 from glsk_o3d.errors import FileFormatError, InvalidParameterError, MissingPackageError, brief
 from glsk_o3d.interop.atomic import write_json
 from glsk_o3d.io.skeletons import READABLE, read_skeleton
-from glsk_o3d.skeleton import Skeleton
 
 from .folders import BenchmarkFolder, CloudFile, read_folder
 from .measures import of_thing

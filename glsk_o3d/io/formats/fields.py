@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ...report import Report
-from ...skeleton import ARRAYS, Skeleton, of_input
+from ...data.report import Report
+from ...data.skeleton import ARRAYS, Skeleton, of_input
 from ..paths import check_budget, check_promised
 
 FORMAT, FORMAT_VERSION = "glsk-o3d skeleton", 1

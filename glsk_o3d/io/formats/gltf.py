@@ -12,12 +12,12 @@ import numpy as np
 
 from ...analysis.rigging import armature, bone_before, bone_names, skin_weights
 from ...analysis.segmentation import vertex_of_cloud
+from ...curve.thin.rooted import RootPlace
+from ...data.skeleton import Skeleton
 from ...errors import FileFormatError, InvalidCloudError, InvalidParameterError
+from ...geometry.vectors import norm, unit
 from ...interop.atomic import check_ending, write_atomically
 from ...interop.clouds import cloud_points, open3d_class
-from ...numerics.vectors import norm, unit
-from ...refinement.rooted import RootPlace
-from ...skeleton import Skeleton
 from ..geometry import to_tubes
 from .graphs import as_forest, global_shift, holding_all
 

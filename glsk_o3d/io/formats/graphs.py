@@ -8,10 +8,10 @@ from numpy.typing import ArrayLike
 
 from ...analysis.branches import branch_table
 from ...analysis.curves import simple_edges
+from ...curve.thin.rooted import RootPlace, numbered_from
+from ...data.skeleton import Skeleton
 from ...editing import cut_loops, reroot
 from ...errors import FileFormatError
-from ...refinement.rooted import RootPlace, numbered_from
-from ...skeleton import Skeleton
 
 FLOAT32_SHARE = 0.01  # derived: an error of a hundredth of a radius is below what any fit of the axis knows
 

@@ -14,7 +14,7 @@ from xml.etree import ElementTree as xml
 
 import numpy as np
 
-from ...skeleton import Skeleton
+from ...data.skeleton import Skeleton
 from ..scan import Scan
 from .graphs import NoEdges, graph_skeleton, line, text, words_by_line
 from .ply import Lists, triangles

@@ -19,8 +19,8 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...data.skeleton import Skeleton
 from ...interop.atomic import write_atomically
-from ...skeleton import Skeleton
 from ..paths import check_promised, number_rows, text_lines
 from ..scan import COLOR_CHANNELS, NO_TRIANGLES, NORMAL_NAMES, Scan, scan_of
 from .graphs import NoEdges, graph_skeleton

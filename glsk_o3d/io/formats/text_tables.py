@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TextIO
 
 import numpy as np
 
-from ...numerics.groups import quantile
+from ...geometry.groups import quantile
 from ..scan import NoPoints, Scan, scan_of
 
 _log = logging.getLogger(__name__)

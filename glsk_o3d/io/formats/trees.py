@@ -8,9 +8,9 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 
+from ...data.skeleton import Skeleton
 from ...errors import FileFormatError
-from ...numerics.vectors import norm
-from ...skeleton import Skeleton
+from ...geometry.vectors import norm
 from .graphs import graph_skeleton, line, parents, text, words_by_line
 
 URDF_DENSITY = 1000.0  # published: of water, in kg/m³; fresh wood and most plants are near it

@@ -12,8 +12,8 @@ import numpy as np
 from glsk_o3d import InvalidCloudError, InvalidParameterError, Skeleton, SkeletonWarning
 from glsk_o3d.analysis import Gripper, grasp_candidates
 from glsk_o3d.analysis.grasp_checks import checked_plane
+from glsk_o3d.api import as_pipeline
 from glsk_o3d.cli.overrides import override
-from glsk_o3d.driver import as_pipeline
 
 from .messages import Make, frames_of, markers_of, points_of, poses_of
 

@@ -9,10 +9,10 @@ import zipfile
 import numpy as np
 import pytest
 
+from glsk_o3d.data.skeleton import Skeleton
 from glsk_o3d.errors import FileFormatError
 from glsk_o3d.io.formats.fields import ARRAYS, write_json, write_npz
 from glsk_o3d.io.skeletons import read_skeleton, save_skeleton
-from glsk_o3d.skeleton import Skeleton
 
 both = pytest.mark.parametrize("ending", [".json", ".npz"])
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from glsk_o3d.numerics.vectors import norm
+from glsk_o3d.geometry.vectors import norm
 
 from .curves import wander
 

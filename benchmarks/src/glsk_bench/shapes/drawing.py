@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from glsk_o3d.errors import InvalidParameterError, did_you_mean
-from glsk_o3d.numerics.groups import component_labels
-from glsk_o3d.numerics.vectors import norm
+from glsk_o3d.geometry.groups import component_labels
+from glsk_o3d.geometry.vectors import norm
 
 from .axis import Draft, UnfitDraw
 from .curves import generator

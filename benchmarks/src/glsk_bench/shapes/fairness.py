@@ -10,7 +10,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial.distance import cdist
 
-from glsk_o3d.numerics.groups import component_labels
+from glsk_o3d.geometry.groups import component_labels
 
 from .axis import subdivided
 

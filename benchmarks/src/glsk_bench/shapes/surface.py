@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from glsk_o3d.numerics.vectors import dot, norm, unit
+from glsk_o3d.geometry.vectors import dot, norm, unit
 from glsk_o3d.samples.capsules import capsule_distance
 
 INSIDE = 2e-5  # fitted: how deep a point is that does not show: where cones hardly bend, none of their balls is drawn

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from glsk_o3d.numerics.groups import component_labels
+from glsk_o3d.geometry.groups import component_labels
 
 from ..fairness import STUB, THINNEST_SPACINGS, grid_topology
 from .field import grid

@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from glsk_o3d.numerics.vectors import dot, norm, unit
+from glsk_o3d.geometry.vectors import dot, norm, unit
 
 from ..surface import Surface
 from .solid import Solid

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from glsk_o3d.numerics.vectors import dot, unit
+from glsk_o3d.geometry.vectors import dot, unit
 
 from ..curves import direction
 from .lines import lengths_along

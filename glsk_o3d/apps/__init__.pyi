@@ -1,0 +1,5 @@
+from . import batch as batch
+from . import crosscheck as crosscheck
+from . import meshlab as meshlab
+
+__all__ = ["batch", "crosscheck", "meshlab"]

@@ -1,0 +1,336 @@
+"""Skeletons of tiles joined into one: nothing lost at a seam, nothing twice."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.cluster.hierarchy import DisjointSet
+from scipy.spatial import cKDTree
+
+from ...analysis.comparison import matched
+from ...analysis.curves import along, pieces, simple_edges
+from ...data.skeleton import Skeleton
+from ...geometry.groups import component_labels
+from ...geometry.paths import maximal_paths
+from ...geometry.vectors import dot, norm
+from .grid import CUT_REACH, Grid, Tile
+
+SAMPLE_STEP = 0.25  # fitted: of the scale of a curve, between the places at which others are compared with it
+MOST_SAMPLES = 1000  # derived: places on an edge, where the part has no thickness: a thousandth of it is near enough
+CLAIM_SHARE = 0.5  # fitted: of how far beyond its box a tile counts, up to where a piece must come to be its own
+LONGEST_STUB = 2.0  # fitted: of its scale, up to which what ends at a seam is the foot of a limb that forks beyond it
+
+
+MADE, BORDER, INNER = 0, 1, 2
+"""Columns of marks: vertices put where an edge crosses a plane, cut ends at the border of what counts, and cut ends
+where the curve goes on in what is there already."""
+
+
+@dataclass(frozen=True)
+class Strands:
+    """A graph of which parts are taken.
+
+    The values of a vertex are x, y, z, radius, confidence, scale, half width and half thickness. The scale is how far
+    another skeleton of the same part may be away: the radius, or the longest edge there, whatever is more.
+    """
+
+    values: np.ndarray  # (n, 8) float
+    edges: np.ndarray  # (e, 2) int
+    marks: np.ndarray  # (n, 3) bool
+
+    @classmethod
+    def of(cls, skeleton: Skeleton) -> Strands:
+        """The graph of a skeleton."""
+        longest = np.zeros(len(skeleton.vertices))
+        np.maximum.at(longest, skeleton.edges, skeleton.edge_lengths[:, None])
+        facts = skeleton.radii, skeleton.confidence, np.fmax(skeleton.radii, longest)
+        values = np.column_stack([skeleton.vertices, *facts, skeleton.half_width, skeleton.half_thickness])
+        return cls(values, skeleton.edges, np.zeros((len(values), 3), bool))
+
+    @property
+    def middles(self) -> np.ndarray:
+        """The values half-way along every edge, (e, 8) float array."""
+        return self.values[self.edges].mean(axis=1)
+
+    @property
+    def degree(self) -> np.ndarray:
+        """(n,) int array."""
+        return np.bincount(self.edges.ravel(), minlength=len(self.values))
+
+    @property
+    def pieces(self) -> np.ndarray:
+        """Connected component of every vertex, (n,) int array."""
+        return component_labels(len(self.values), self.edges)
+
+    def split(self, axis: int, value: float) -> Strands:
+        """The same with a vertex wherever an edge crosses a plane."""
+        side = self.values[:, axis] - value
+        crosses = np.prod(np.sign(side)[self.edges], axis=1) < 0
+        a, b = self.edges[crosses].T
+        share = (side[a] / (side[a] - side[b]))[:, None]
+        new = self.values[a] + share * (self.values[b] - self.values[a])
+        new[:, axis] = value
+        at = len(self.values) + np.arange(len(new))
+        halves = [np.stack([a, at], axis=1), np.stack([at, b], axis=1)]
+        return Strands(
+            np.concatenate([self.values, new]),
+            np.concatenate([self.edges[~crosses], *halves]),
+            np.concatenate([self.marks, np.tile([True, False, False], (len(new), 1))]),
+        )
+
+    def keep(self, edges: np.ndarray, alone: np.ndarray, mark: int) -> Strands:
+        """Some edges with their vertices, and of the vertices that have none those that are chosen by `alone`.
+
+        Vertices that lose some of their edges are marked in the column `mark`.
+        """
+        degree = np.bincount(self.edges[edges].ravel(), minlength=len(self.values))
+        marks = self.marks.copy()
+        marks[:, mark] |= (degree > 0) & (degree < self.degree)
+        return Strands(self.values, self.edges[edges], marks)._compact((degree > 0) | (alone & (self.degree == 0)))
+
+    def with_pieces(self, chosen: np.ndarray) -> Strands:
+        """The connected pieces that have one of some vertices, (n,) bool array."""
+        pieces = self.pieces
+        whole = np.isin(pieces, pieces[chosen])
+        return Strands(self.values, self.edges[whole[self.edges[:, 0]]], self.marks)._compact(whole)
+
+    def within(self, low: np.ndarray, high: np.ndarray) -> Strands:
+        """What is in a box, cut at its faces."""
+        cut = self
+        for axis in range(3):
+            for value in (low[axis], high[axis]):
+                cut = cut.split(axis, float(value)) if np.isfinite(value) else cut
+        return cut.keep(inside(cut.middles, low, high), inside(cut.values, low, high), BORDER)
+
+    def touching(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+        """Vertices in a box, or with an edge whose middle is, (n,) bool array."""
+        found = inside(self.values, low, high)
+        found[self.edges[inside(self.middles, low, high)]] = True
+        return found
+
+    def outward(self) -> np.ndarray:
+        """At every cut end at the border the direction in which its curve would go on, (n, 3) float array; else 0."""
+        a, b = self.edges.T
+        step = self.values[b, :3] - self.values[a, :3]
+        step = step / np.maximum(norm(step), np.finfo(float).tiny)[:, None]
+        found = np.zeros((len(self.values), 3))
+        np.add.at(found, b, step)
+        np.add.at(found, a, -step)
+        return found * self.marks[:, [BORDER]]
+
+    def mended(self) -> Strands:
+        """Without the vertices that were made in vain, in the middle of edges that went on."""
+        kept = ~self.marks[:, MADE] | self.marks[:, [BORDER, INNER]].any(axis=1) | (self.degree != 2)
+        paths = (np.compress(kept[path], path) for path, _ in maximal_paths(len(kept), self.edges))
+        links = [np.empty((0, 2), np.int64), *(np.stack([path[:-1], path[1:]], axis=1) for path in paths)]
+        return Strands(self.values, simple_edges(np.concatenate(links)), self.marks)._compact(kept)
+
+    def _compact(self, kept: np.ndarray) -> Strands:
+        number = np.cumsum(kept) - 1
+        return Strands(self.values[kept], number[self.edges].reshape(-1, 2), self.marks[kept])
+
+
+class Seams(NamedTuple):
+    """How cut ends met at the seams of tiles."""
+
+    joined: int  # pairs that were made one, and ends that were tied to a curve beside them
+    unmatched: int  # ends that nobody went on from, since one of two tiles lost what the other has; kept as ends
+    thickest: float  # radius of the thickest part within reach of a cut through the points
+
+    def messages(self, grid: Grid) -> list[str]:
+        """What is to be beware of, in sentences."""
+        messages = []
+        if self.unmatched:
+            messages.append(
+                f"{self.unmatched} of {self.joined + self.unmatched} cuts at seams have nothing to meet on the other "
+                "side, and end there: give larger tiles, or more overlap"
+            )
+        if self.thickest > grid.thickest:
+            messages.append(
+                f"at seams there are parts thicker than the overlap of {grid.overlap:g} allows, radius up to "
+                f"{self.thickest:.3g}: give {grid.overlap * self.thickest / grid.thickest:.3g} or more"
+            )
+        return messages
+
+
+class Samples(NamedTuple):
+    """Places along curves that are there."""
+
+    places: np.ndarray  # (m, 3)
+    scale: np.ndarray  # (m,)
+    vertex: np.ndarray  # (m,) number of the nearer end of the edge
+    outward: np.ndarray  # (m, 3) where the curve would go on, at cut ends; 0 elsewhere
+
+
+def join_tiles(skeletons: Mapping[Tile, Skeleton], grid: Grid) -> tuple[Skeleton, Seams]:
+    """Join the skeletons of overlapping tiles, whatever their order; the result has no points.
+
+    What crosses a face was seen whole by the tiles on both sides, and their skeletons nearly coincide there. Tiles are
+    taken in the order of their numbers. Each brings the pieces of its skeleton that come into its box, or a little
+    beyond it, less what lies on what others brought; where that ends, their cut ends are at hand, and the two are made
+    one. So a curve is cut once where it crosses from tile to tile, and not at all where it runs along a face. Parts are
+    farther apart than either is thick: what lies nearer to another tile's skeleton than the radius is the same part.
+
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import torus
+    >>> points = torus(8000, radius=0.05).points
+    >>> grid = Grid.over(points.min(axis=0), points.max(axis=0), size=0.6, overlap=0.15)
+    >>> ring, seams = join_tiles({tile: skeletonize(points[rows]) for tile, rows in grid.parted(points)}, grid)
+    >>> ring.n_components, ring.n_loops, seams.joined, seams.unmatched
+    (1, 1, 4, 0)
+    """
+    joint = _Joint()
+    brought: dict[Tile, Samples] = {}
+    for tile in sorted(skeletons):
+        near = [each for each in brought if max(abs(a - b) for a, b in zip(each, tile, strict=True)) <= 1]
+        strands = Strands.of(skeletons[tile]).within(*grid.box(tile, grid.trust))
+        # the skeleton of a part within reach of a cut through the points is not to be trusted
+        cut = ~inside(strands.values, *grid.box(tile, grid.overlap), CUT_REACH * strands.values[:, 3])
+        joint.thickest = float(np.nanmax(strands.values[cut, 3], initial=joint.thickest))
+        strands = strands.with_pieces(strands.touching(*grid.box(tile, CLAIM_SHARE * grid.trust)))
+        theirs = None
+        if near:
+            theirs = Samples(*map(np.concatenate, zip(*(brought[each] for each in near), strict=True)))
+        if theirs is not None and len(theirs.places):
+            strands, met = _not_there(strands, theirs, grid, tile, near)
+            joint.met.append(met)
+        brought[tile] = joint.bring(strands, theirs)
+    return joint.finished()
+
+
+def _not_there(
+    strands: Strands, theirs: Samples, grid: Grid, tile: Tile, near: Sequence[Tile]
+) -> tuple[Strands, np.ndarray]:
+    """What others have not brought, and the values of the ends of the object that they have."""
+    for axis, value in grid.seams(tile):
+        strands = strands.split(axis, value)
+    there = _covered(strands.middles, theirs)
+    ends = (strands.degree == 1) & ~strands.marks[:, BORDER]
+    ends[strands.edges[~there]] = False
+    left = strands.keep(~there, ~_covered(strands.values, theirs), INNER)
+    # a stretch of a curve that others saw, too, and elsewhere, is theirs; unless they have nothing there at all
+    middles = left.middles
+    seen = np.any([inside(middles, *grid.box(each, grid.trust), middles[:, 5]) for each in near], axis=0)
+    leaves = np.zeros(len(left.values), bool)
+    leaves[left.edges[~seen]] = True
+    pieces = left.pieces
+    leaves |= ~np.isin(pieces, pieces[left.marks[:, INNER]])
+    return left.with_pieces(leaves).mended(), strands.values[ends]
+
+
+def _covered(values: np.ndarray, theirs: Samples) -> np.ndarray:
+    """Which places are on curves that are there: no farther from them than either is thick, and not past a cut end."""
+    distance, nearest = cKDTree(theirs.places).query(values[:, :3])
+    past = dot(values[:, :3] - theirs.places[nearest], theirs.outward[nearest]) > 0
+    return (distance <= np.fmax(values[:, 5], theirs.scale[nearest])) & ~past
+
+
+class _Joint:
+    """What has been brought so far. Vertices are numbered through."""
+
+    def __init__(self) -> None:
+        self._values = [np.empty((0, 8))]
+        self._edges = [np.empty((0, 2), np.int64)]
+        self._merged: list[tuple[int, int]] = []  # a cut end, and the earlier one that is the same place
+        self._touching: list[tuple[int, int]] = []  # a cut end that found none, and the earlier vertex nearest to it
+        self._open: dict[int, np.ndarray] = {}  # the values of cut ends that nobody has gone on from
+        self.met = [np.empty((0, 8))]  # ends of the object that others brought: there a cut end has nothing to meet
+        self.thickest = 0.0
+
+    def bring(self, strands: Strands, theirs: Samples | None) -> Samples:
+        """Add what a tile brings, and join its inner cut ends to what others did; gives it as samples."""
+        first = sum(map(len, self._values))
+        self._values.append(strands.values)
+        self._edges.append(strands.edges + first)
+        border, inner = strands.marks[:, BORDER], strands.marks[:, INNER]
+        self._open |= {first + at: strands.values[at] for at in np.flatnonzero(border & ~inner).tolist()}
+        if inner.any():
+            assert theirs is not None
+            self._meet({first + at: strands.values[at] for at in np.flatnonzero(inner).tolist()}, theirs)
+        places, edges = strands.values[:, :3], strands.edges
+        scale = np.fmax(np.fmin(*strands.values[edges, 5].T), np.finfo(float).tiny)
+        step = np.fmax(SAMPLE_STEP * scale, norm(places[edges[:, 1]] - places[edges[:, 0]]) / MOST_SAMPLES)
+        row, part = pieces(places, edges, step) if len(edges) else (np.empty(0, int), np.empty(0))
+        between = along(edges, row, part, strands.values) if len(edges) else np.empty((0, 8))
+        values = np.concatenate([strands.values, between])
+        vertex = np.concatenate([np.arange(len(places)), edges[row, (part > 0.5).astype(int)]])
+        outward = np.concatenate([strands.outward(), np.zeros((len(row), 3))])
+        return Samples(values[:, :3], values[:, 5], first + vertex, outward)
+
+    def _meet(self, ends: dict[int, np.ndarray], theirs: Samples) -> None:
+        """Match cut ends with open ones, the nearest first, one to one; others touch what is nearest."""
+        known = set(theirs.vertex.tolist())
+        waiting = {at: values for at, values in self._open.items() if at in known}
+        mine, others = (np.array(list(each.values())).reshape(-1, 8) for each in (ends, waiting))
+        one_of, other_of = list(ends), list(waiting)
+        loose = dict(ends)
+        for row, column in matched(mine[:, :3], others[:, :3], mine[:, None, 5] + others[:, 5]):
+            one, other = one_of[row], other_of[column]
+            self._merged.append((one, other))
+            del loose[one], self._open[other]
+        if loose:
+            nearest = cKDTree(theirs.places).query(np.array(list(loose.values()))[:, :3])[1]
+            self._touching += zip(loose, theirs.vertex[nearest].tolist(), strict=True)
+
+    def finished(self) -> tuple[Skeleton, Seams]:
+        """The skeleton that was brought together: merged, tied up, without stubs; and how."""
+        values = np.concatenate(self._values)
+        same = np.arange(len(values))
+        one, other = np.array(self._merged, np.int64).reshape(-1, 2).T
+        same[one] = other
+        values[other] = (values[other] + values[one]) / 2
+        alive = same == np.arange(len(values))
+        touching = same[np.array(self._touching, np.int64).reshape(-1, 2)]
+        edges = simple_edges(same[np.concatenate(self._edges)])
+        connected = DisjointSet(range(len(alive)))  # cut ends are tied to curves beside them, if that closes no loop
+        pairs = component_labels(len(alive), edges)[touching].tolist()
+        tied = np.array([connected.merge(*pair) for pair in pairs], bool)
+        edges, loose = simple_edges(np.concatenate([edges, touching[tied]])), touching[~tied, 0]
+        ends = np.concatenate([np.array(list(self._open), np.int64), loose])
+        ends = ends[np.bincount(edges.ravel(), minlength=len(values))[ends] < 2]  # where curves fork, some go on
+        gone, ends = _stubs(values, edges, ends)
+        alive[gone] = False
+        edges = edges[alive[edges].all(axis=1)]
+        met = np.concatenate(self.met)
+        if len(met):  # where an end of the object is beside a cut end, another tile saw it: there is nothing to meet
+            distance, nearest = cKDTree(met[:, :3]).query(values[ends, :3])
+            ends = ends[distance > values[ends, 5] + met[nearest, 5]]
+        seams = Seams(len(other) + len(touching) - len(loose), len(ends), self.thickest)
+        number, kept, none = np.cumsum(alive) - 1, values[alive], np.empty((0, 3))
+        edges = simple_edges(number[edges])
+        known = dict(zip(("radii", "confidence", "half_width", "half_thickness"), kept.T[[3, 4, 6, 7]], strict=True))
+        return Skeleton(kept[:, :3], edges, vertex_of_point=none, points=none, normals=none, **known), seams
+
+
+def _stubs(values: np.ndarray, edges: np.ndarray, ends: np.ndarray) -> tuple[list[int], np.ndarray]:
+    """Vertices of short limbs that end in a cut: on the other side they fork elsewhere; and the other cut ends."""
+    gone: list[int] = []
+    left: list[int] = []
+    around = defaultdict[int, set[int]](set)
+    for a, b in edges.tolist():
+        around[a].add(b)
+        around[b].add(a)
+    for end in ends.tolist():
+        path, length, longest = [end], 0.0, LONGEST_STUB * values[end, 5]
+        onward = around[end]
+        while len(onward) == 1 and length <= longest:
+            (at,) = onward
+            length += float(norm(values[None, at, :3] - values[path[-1], :3])[0])
+            onward = around[at] - {path[-1]}
+            path.append(at)
+        if len(path) > 1 and len(onward) > 1 and length <= longest:
+            gone += path[:-1]
+            around[path[-1]] = onward
+        else:
+            left.append(end)
+    return gone, np.array(left, np.int64)
+
+
+def inside(values: np.ndarray, low: np.ndarray, high: np.ndarray, by: np.ndarray | float = 0.0) -> np.ndarray:
+    """Which rows, whose first columns are x, y and z, lie in a box, so far from its faces at least, (n,) bool array."""
+    places, by = values[:, :3], np.reshape(by, (-1, 1))
+    return np.all((places >= low + by) & (places <= high - by), axis=1)

@@ -1,0 +1,125 @@
+"""Warnings about places without a meaningful curve skeleton: sheets, balls, and points that do not determine it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..data.decisions import coordinates
+from ..data.skeleton import Skeleton
+from ..geometry.groups import component_labels, group_median, group_sum
+from ..geometry.vectors import dot, norm
+from .axis.sections import VertexPoints, measure_sections
+from .topology.collapse import with_fields
+
+SHEET_SHARE = 0.9  # fitted: share of one direction among the normals around a vertex; a tube has 0.5, half a tube too
+# warning: spread of the normal lines around where they meet, over the radius; a ball has 0, a torus 0.65, a tube 1
+BALL_SPREAD = 0.5
+# measured: length of what is hardly longer than thick, over how thick it is: half its width, or the median distance to
+# the surface; the evenly filled box with the spread of a ball has 2 to 3
+STUB_LENGTH = 3.3
+MAJORITY = 0.5  # derived: of the points, from which on a cloud is called what they are
+LOW_CONFIDENCE = 0.1  # warning: below which a vertex is not to be trusted
+LOW_CONFIDENCE_SHARE = 0.25  # warning: of the points around such vertices that is worth a warning
+
+REASONS = ("sheet-like", "sphere-like", "no edges", "uncertain topology", "weakly supported")
+"""What the messages of `diagnose` begin with."""
+
+
+def measured(skeleton: Skeleton) -> Skeleton:
+    """A finished skeleton with its sections, and with the reasons not to trust it among the warnings of its report.
+
+    They take the place of those of before, and follow what other filters warned of.
+    """
+    sections = measure_sections(skeleton)
+    skeleton = with_fields(skeleton, half_width=sections.half_width, half_thickness=sections.half_thickness)
+    others = [message for message in skeleton.report.warnings if message.partition(":")[0] not in REASONS]
+    return replace(skeleton, report=replace(skeleton.report, warnings=(*others, *diagnose(skeleton))))
+
+
+def diagnose(skeleton: Skeleton) -> list[str]:
+    """Reasons not to trust a skeleton: the cloud is sheet-like, sphere-like, or does not say where much of the axis is.
+
+    Sheet-like: the normals around a vertex have one direction, and it has little confidence, unlike a blade, which has
+    two sides; or it is of a component whose curve is hardly longer than the part is wide: a coin, a plate. Sphere-like:
+    the normal lines of a whole component meet in one point, or it is hardly longer than thick. All are scale-free. Of a
+    cloud that is neither, the parts with little confidence are named, and the least certain question about loops, air
+    and gaps. No edges at all are a reason, too.
+    """
+    cloud = VertexPoints(skeleton)
+    if len(cloud.rows) == 0:
+        return []
+    vertex, normals, count = cloud.vertex, cloud.normals, cloud.count
+    along = np.einsum("ni,nj->nij", normals, normals)
+
+    part, n = skeleton.component_of_vertex, skeleton.n_components
+    component = part[vertex]
+    size = np.bincount(component, minlength=n)[:, None]
+    one_way = np.linalg.eigvalsh(group_sum(along, vertex, len(count)))[:, 2] > SHEET_SHARE * np.maximum(count, 1)
+    curve = np.bincount(part[skeleton.edges[:, 0]], skeleton.edge_lengths, n)
+    stub = curve < STUB_LENGTH * group_median(skeleton.half_width[vertex], component, n)
+    sheet = count[one_way & (~(skeleton.confidence >= LOW_CONFIDENCE) | stub[part])].sum() / len(vertex)
+    if sheet > MAJORITY:
+        return [
+            f"sheet-like: around {sheet:.0%} of the points the surface faces one direction only, "
+            "so a curve skeleton has little meaning; if that is a table or a floor under an object, remove it first, "
+            "with Open3D's segment_plane or read_cloud(..., where='z > ...')"
+        ]
+
+    points = cloud.points - skeleton.vertices[0]
+    # of every normal line I - n n^T, which takes away what is along it
+    weight = (size[:, :, None] + 1e-9 * np.maximum(size, 1)[:, :, None]) * np.eye(3) - group_sum(along, component, n)
+    height = dot(normals, points)[:, None]
+    meet = np.linalg.solve(weight, group_sum(points - height * normals, component, n)[:, :, None])[:, :, 0]
+    offset = points - meet[component]
+    distance = dot(offset, offset)
+    miss = distance - dot(normals, offset) ** 2
+    spread = group_sum(np.column_stack([miss, distance]), component, n)
+    ball = spread[:, 0] < BALL_SPREAD**2 * spread[:, 1]
+    share = size[ball].sum() / len(vertex)
+    if share > MAJORITY:
+        return [
+            f"sphere-like: the normals of parts with {share:.0%} of the points meet in one point, "
+            "so no curve skeleton is meaningful there"
+        ]
+    spread = group_sum(np.einsum("ni,nj->nij", points, points), component, n) / np.maximum(size, 1)[:, :, None]
+    mean = group_sum(points, component, n) / np.maximum(size, 1)
+    length = np.sqrt(12 * np.maximum(np.linalg.eigvalsh(spread - mean[:, :, None] * mean[:, None])[:, 2], 0))
+    reach = group_median(norm(cloud.offset), component, n)
+    share = size[length < STUB_LENGTH * reach].sum() / len(vertex)
+    if share > MAJORITY:
+        return [
+            f"sphere-like: parts with {share:.0%} of the points are hardly longer than thick, "
+            "so no curve skeleton is meaningful there"
+        ]
+    if len(skeleton.edges) == 0:
+        return ["no edges: every part became one vertex; is Connector.radius larger than the parts are long?"]
+    return _weak_region(skeleton, count) + _close_calls(skeleton)
+
+
+def _close_calls(skeleton: Skeleton) -> list[str]:
+    close = [it for it in skeleton.report.uncertain if it.about != "limb"]
+    if not close:
+        return []
+    asked = sum(it.about != "limb" for it in skeleton.report.decisions)
+    return [
+        f"uncertain topology: {len(close)} of {asked} questions about loops, air and gaps were close calls, above all "
+        f"whether {close[0].question} (probability {close[0].probability:.2f}): look there; "
+        f"if '{close[0].outcome}' is wrong, set {close[0].otherwise}"
+    ]
+
+
+def _weak_region(skeleton: Skeleton, count: np.ndarray) -> list[str]:
+    weak = skeleton.confidence < LOW_CONFIDENCE
+    share = count[weak].sum() / count.sum()
+    if share <= LOW_CONFIDENCE_SHARE:
+        return []
+    inner = skeleton.edges[weak[skeleton.edges].all(axis=1)]
+    label = component_labels(len(weak), inner)
+    most = np.argmax(np.bincount(label[weak], count[weak], minlength=len(weak)))
+    region = skeleton.vertices[weak & (label == most)]
+    middle = region.mean(axis=0)
+    reach, place = norm(region - middle).max(), coordinates(middle)
+    return [
+        f"weakly supported: around {share:.0%} of the points, above all within {reach:.3g} of ({place}), the points do "
+        "not agree on an axis: they are too sparse or noisy, or their parts are no tubes, such as a table under it"
+    ]

@@ -1,0 +1,1 @@
+"""Where the curve goes at junctions, at ends, and in wide ends and handles."""

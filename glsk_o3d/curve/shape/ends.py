@@ -1,0 +1,337 @@
+"""Grow ends anew along their limbs, to where the limbs stop."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ...data.skeleton import NOT_MEASURED, Skeleton
+from ...geometry.groups import Members, quantile
+from ...geometry.neighbourhoods import plane_axes
+from ...geometry.polylines import arc_lengths, place_at
+from ...geometry.vectors import TINY, Floats, cross, dot, norm, unit
+from ..axis.fit import axis_box
+from ..axis.sections import Sections, VertexPoints, measure_sections
+from ..topology.collapse import with_fields
+from ..topology.limbs import AXIS_LENGTH
+
+END_CUT = 1.75  # fitted: distance from where the points stop, in larger half widths, within which a cap bends the curve
+END_SIZE = 4.0  # fitted: radii behind the cut over which it is seen how wide a limb is, and how fast it gets thinner
+END_REACH = 0.98  # fitted: share of an end's points within its reach: normals and noise throw the others farther
+END_BENDING = 0.5  # fitted: weight of going straight on, twice lambda
+END_ROUNDS = 3  # measured: from then on hardly anything moves
+END_POINTS = 4  # derived: fewer cannot say where a limb turns
+END_THINNER = 2 / 3  # measured: over its limb's radius, that of a neck at most; a round cap seems to have .85 of it
+END_SIDES = 1 / 3  # derived: share of the last points that are sides, at least; 2/3 at a flat end, none on its face
+ONE_SIDED = 1 / np.pi  # derived: radii from the axis to the mean of points around it, between half a tube's and none
+CURVE_SAMPLES = 64  # derived: places along a parabola that say its length to 1e-3 of the whole
+WAY_SAMPLES = 16  # derived: places along a run that say its direction, several on each of its few edges
+# For points weighted by the cube of c, the cosine of their normals with the axis: on a round cap of radius 1, where c
+# is the height over its centre and every height has the same area,
+CAP_POWER = 3  # fitted: the power; lower ones let the sides have a say
+ROUND_MEAN = 4 / 5  # derived: mean height,
+ROUND_VARIANCE = 2 / 75  # derived: its variance,
+ROUND_AREA = 1 / 2  # derived: and the weight over that of a flat cap
+
+
+def regrow_ends(skeleton: Skeleton, to_surface: bool = False) -> Skeleton:
+    r"""Cut every end where a cap may have bent it, and let it grow along its limb to where this stops.
+
+    Contraction draws the end of a limb into an edge or a corner of the face that closes it, and the fit follows, since
+    the normals of a cap do not say where the axis is. So vertices are cut that are in a corner, see `_last`, or within
+    1.75 half widths of where the points stop, or within their own half width of the last one. The limb goes on in the
+    direction t of the two radii behind, with the turn d and the bend k, across t, that the normals n of its sides ask
+    for:
+
+    .. math:: \sum_p w \left((b \cdot (s (t + d) + s^2 k / 2 - p))^2 + \lambda (s^2 |d|^2 + s^4 |k|^2 / 4)\right),
+        \quad b = n \times t
+
+    with p and its length s along t seen from the last vertex left. A point whose plane passes the curve by half a
+    radius counts half, and those beyond the reach do not count. The fit is made three times, each along t + d of the
+    one before. See `_End.tip` and `_End._cap` for where it stops, which may also be where the axis comes `to_surface`.
+    No end leaves its points.
+
+    New vertices come behind all others, with the confidence of the run behind and the radii of their own sections.
+    Points of a vertex that was cut belong to the nearest one of the same end. Loops and vertices without edges stay.
+    """
+    if not len(skeleton.leaves):
+        return skeleton
+    cloud, sections = VertexPoints(skeleton), measure_sections(skeleton)
+    grown = [found for end in _ends(cloud) if (found := _grow(cloud, sections, *end, to_surface))]
+    return _replanted(skeleton, grown) if grown else skeleton
+
+
+class _Grown(NamedTuple):
+    """An end that has grown anew."""
+
+    path: np.ndarray  # (p,) its branch, towards the leaf
+    cut: int  # number along the path of the first vertex that goes
+    places: np.ndarray  # (k, 3), of the new vertices, outwards
+    run: np.ndarray  # vertices behind the cut
+
+
+def _ends(cloud: VertexPoints) -> Iterator[tuple[np.ndarray, int, bool]]:
+    """Every branch that has a leaf, seen towards it, the first vertex that may go, and whether it begins with a leaf.
+
+    The vertex in the middle of a branch with two ends stays. Of another the first vertex out of the part that it grows
+    from stays, which says where it leads; one that does not leave that part is none of them.
+    """
+    skeleton = cloud.skeleton
+    for branch in skeleton.branches:
+        leaf, along = skeleton.degree[branch[[0, -1]]] == 1, arc_lengths(skeleton.vertices[branch])
+        if not along[-1] > 0 or (leaf.all() and len(branch) < 3):
+            continue
+        middle = 1 + np.argmin(np.abs(along[1:-1] - along[-1] / 2)) if leaf.all() else 0
+        for path, ends, stays in ((branch[::-1], leaf[0], len(branch) - 1 - middle), (branch, leaf[1], middle)):
+            if ends and not leaf.all():
+                away = norm(skeleton.vertices[path] - skeleton.vertices[path[0]])
+                stays = np.flatnonzero(away <= cloud.distance[path[0]])[-1] + 1
+            if ends and stays < len(path):
+                yield path, int(stays + 1), bool(leaf.all())
+
+
+def _grow(
+    cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int, other: bool, to_surface: bool
+) -> _Grown | None:
+    """Cut the end of a path, and let it grow anew; None if too few points say where."""
+    places, radii, half_widths = cloud.skeleton.vertices[path], sections.radius[path], sections.half_width[path]
+    along = arc_lengths(places)
+    last = _last(cloud, path, along, first, other)
+    length = along[last]
+    run, cut, way = _within(along, length, END_SIZE * quantile(radii)), len(path), np.zeros(3)
+    late = (length - along <= half_widths) & (other | (along >= half_widths))
+    late[last + 1 :] = True
+    stop = np.clip(along[np.argmax(late)] if late.any() else length, length / 2, length)
+    for _ in range(2):  # how far the points reach is seen along a run that is no part of the cap itself
+        radius, wide = quantile(radii[run]), quantile(half_widths[run])
+        start = max(stop - AXIS_LENGTH * radius, 0)
+        way, anchor = _way(places, along, start, stop), place_at(places, along, stop)
+        # the points of a junction are other limbs', too
+        own = cloud.members.of(path[max(np.searchsorted(along, start), 0 if other else 1) :])
+        if len(own) < END_POINTS:
+            return None
+        reach = quantile((cloud.points[own] - anchor) @ way, END_REACH)
+        close = ((places - anchor) @ way > reach - END_CUT * wide) | late
+        close = np.flatnonzero(close & (along > start))
+        cut = max(close[0] if len(close) else len(path), first)
+        stop = along[cut - 1]
+        run = _within(along, stop, END_SIZE * radius)
+    radius, anchor = quantile(radii[run]), places[cut - 1]
+    if stop > radius / 2:  # of a stub there is no run: it goes on as it was
+        way = _way(places, along, max(stop - AXIS_LENGTH * radius, 0), stop)
+    own = cloud.members.of(path[max(cut - 2, 0 if other else min(1, len(path) - 1)) :])
+    points = cloud.points[own] - anchor
+    ahead = points @ way > 0
+    if ahead.sum() < END_POINTS:
+        return None
+    end = _End.of(points[ahead], cloud.normals[own[ahead]], way, radius)
+    behind = _within(along, stop, END_SIZE * radius)
+    tip = end.tip(_Taper.of(along[behind] - stop, radii[behind], radius), to_surface)
+    steps = np.diff(along[run])
+    step = quantile(steps) if len(steps) else length / last
+    tip = max(tip, step / 2)
+    # edges of no length are those of no limb
+    number = max(round(min(tip / max(step, TINY), len(points))), 1)
+    return _Grown(path, cut, anchor + end.curve(np.arange(1, number + 1) / number * tip), path[run])
+
+
+def _last(cloud: VertexPoints, path: np.ndarray, along: np.ndarray, first: int, other: bool) -> int:
+    """Number along a path of the last vertex before the curve is drawn into a corner.
+
+    The vertices after it have at most a fiftieth of the branch's points, without those of a junction, and are no longer
+    than what a cap bends.
+    """
+    count = cloud.count[path] * (other | (np.arange(len(path)) > 0))
+    own = cloud.members.of(path[count > 0])
+    thick = np.sqrt((cloud.offset[own] ** 2).sum() / max(len(own), 1))
+    some = np.cumsum(count[::-1])[::-1] > (1 - END_REACH) * len(own)
+    least = np.searchsorted(along, along[-1] - END_CUT * thick)
+    return int(min(max(np.flatnonzero(some).max(initial=0), least, first), len(path) - 1))
+
+
+def _within(along: np.ndarray, stop: float, length: float) -> np.ndarray:
+    """Numbers of the vertices of a path in a run that ends at `stop`, at least one, int array."""
+    last = max(np.searchsorted(along, stop, side="right") - 1, 0)
+    return np.arange(min(np.searchsorted(along, stop - length), last), last + 1)
+
+
+def _way(places: np.ndarray, along: np.ndarray, start: float, stop: float) -> np.ndarray:
+    """Direction of a path from one length along it to another, (3,) float array, by least squares."""
+    lengths = np.linspace(start, stop, WAY_SAMPLES)
+    way: Floats = (lengths - lengths.mean()) @ place_at(places, along, lengths)
+    return way / max(np.linalg.norm(way), TINY)
+
+
+class _Taper(NamedTuple):
+    """The radius of a limb as it goes on: it may get smaller, but nobody knows of a limb that it gets thicker."""
+
+    radius: float  # where the limb is cut
+    slope: float
+
+    @classmethod
+    def of(cls, along: np.ndarray, radii: np.ndarray, radius: float) -> _Taper:
+        """From radii behind the cut, (k,) float arrays, and that of the run."""
+        away = along - along.mean()
+        spread = away @ away
+        # a run shorter than its radius says nothing
+        slope = (away @ radii) / spread if len(along) > 3 and np.ptp(along) > radius else 0.0
+        slope = float(np.clip(slope, -1, 0))
+        return cls(radius * (1 + slope * AXIS_LENGTH / 2), slope)
+
+    def at(self, length: float) -> float:
+        return max(self.radius + self.slope * length, 0.0)
+
+
+class _End(NamedTuple):
+    """What lies ahead of the last vertex that is left of a limb, seen from there."""
+
+    points: np.ndarray  # (n, 3)
+    normals: np.ndarray  # (n, 3), of either sign
+    way: Floats  # (3,), slope of the parabola at the origin
+    bend: Floats  # (3,), and how fast it changes along it
+    length: np.ndarray  # (n,), along the curve to the place nearest to each point
+    steps: np.ndarray  # (s,), of the parabola,
+    along: np.ndarray  # (s,), and its length up to them
+
+    @classmethod
+    def of(cls, points: np.ndarray, normals: np.ndarray, way: np.ndarray, radius: float) -> _End:
+        """The curve through the origin in a direction that suits the points best."""
+        turn = bend = np.zeros(3)
+        for _ in range(END_ROUNDS):  # the axis of the parabola is the limb behind: where this turns, so must the axis
+            way = unit((way + turn)[None])[0]
+            turn, bend = _turn_and_bend(points, normals, way, bend, radius)
+        step, way = points @ way, way + turn
+        # the nearest place of the curve: one step of Newton from the one abreast, by a radius at most
+        slope = way + step[:, None] * bend
+        off = points - step[:, None] * way - (step**2 / 2)[:, None] * bend
+        step = step + np.clip(dot(off, slope) / np.maximum(dot(slope, slope) - off @ bend, 0.5), -radius, radius)
+        steps = np.linspace(0, max(2 * step.max(), TINY), CURVE_SAMPLES)
+        along = arc_lengths(np.stack([steps, steps**2 / 2], axis=1) @ np.stack([way, bend]))
+        return cls(points, normals, way, bend, np.interp(step, steps, along), steps, along)
+
+    def curve(self, length: np.ndarray) -> np.ndarray:
+        """Places so far ahead, (k, 3) float array."""
+        step: Floats = np.interp(length, self.along, self.steps) + np.maximum(length - self.along[-1], 0)
+        return step[:, None] * self.way + (step**2 / 2)[:, None] * self.bend
+
+    def slope(self, length: np.ndarray) -> np.ndarray:
+        """Directions of the curve so far ahead, (k, 3) float array."""
+        return self.way + np.interp(length, self.along, self.steps)[:, None] * self.bend
+
+    def tip(self, taper: _Taper, to_surface: bool) -> float:
+        """How far the limb goes on, or its axis within it.
+
+        Where its last points are much nearer to the axis than it is thick, as on the neck of a bottle, it has the cap
+        of that thinner limb.
+        """
+        reach, farthest = quantile(self.length, END_REACH), float(self.length.max())
+        if to_surface and 2 * taper.at(farthest) < taper.radius:  # hardly any points say where a cone has its apex
+            return min(taper.radius / -taper.slope, farthest)
+        return self._cap(self._thinner(taper, reach), reach, to_surface)
+
+    def _thinner(self, taper: _Taper, reach: float) -> _Taper:
+        """The limb of the last points, if they are much nearer to the axis than it is thick, and all around it."""
+        radius = given = taper.at(reach - taper.radius)
+        centre = np.zeros(3)
+        for _ in range(END_ROUNDS):
+            late = self.length > reach - radius
+            if late.sum() < END_POINTS:
+                break
+            length = self.length[late]
+            tangent = unit(self.slope(length))
+            normals = self.normals[late] - dot(self.normals[late], tangent)[:, None] * tangent
+            away = self.points[late] - self.curve(length)
+            centre = away.mean(axis=0)
+            sides = dot(normals, normals).sum()
+            if sides < END_SIDES * late.sum():
+                return taper
+            across = norm(normals) @ np.abs(dot(away, normals)) / max(sides, TINY)
+            radius = min(radius, float(across))
+        around = np.linalg.norm(centre) < ONE_SIDED * radius
+        return _Taper(radius, 0.0) if around and radius < END_THINNER * given else taper
+
+    def _cap(self, taper: _Taper, reach: float, to_surface: bool) -> float:
+        """How far it is to half a radius inside a flat cap, or to the centre of a round one; or to the cap itself.
+
+        Let c be the cosine of an outward normal with the axis. The mean length s with the weights c^3 is on a flat cap,
+        and .8 radii beyond the centre of a round one; the variance is 0 there and 2/75 squared radii here, so mean - r
+        / 2 - 45/4 variance / r is right in both. Averages do not follow single points, as extremes do in noise. What is
+        missing of the cap, of an open pipe all of it, counts as if it were where the sides stop: twice as far as their
+        mean. The cap itself is at mean + 15/2 variance / r.
+        """
+        start = max(reach - taper.at(reach - taper.radius), 0.0)
+        late = self.length > start
+        if late.sum() < END_POINTS:
+            return reach if to_surface else max(reach - taper.at(reach) / 2, 0.0)
+        length = self.length[late] - start
+        tangent = self.slope(self.length[late])
+        normals, points = self.normals[late], self.points[late] - self.curve(np.array([start]))
+        outward = np.where(dot(normals, points) < 0, -1, 1) * dot(normals, tangent) / norm(tangent)
+        # those of a cone lean outwards, too
+        cap = np.maximum(outward + taper.slope / np.hypot(1, taper.slope), 0) ** CAP_POWER
+        side = np.maximum(1 - outward**2, 0)
+        stop = 2 * (side @ length) / max(side.sum(), TINY)
+        weight, radius = float(cap.sum()), taper.at(start + stop)
+        mean = cap @ length / max(weight, TINY)
+        variance = max(cap @ length**2 / max(weight, TINY) - mean**2, 0)
+        # the cap of a tube has half a radius times the area of a unit of its length
+        owed = ROUND_AREA * side.sum() * taper.radius / (2 * max(stop, TINY))
+        seen = weight / max(owed, weight, TINY)
+        round_share = min(variance / max(ROUND_VARIANCE * radius**2, TINY), 1)
+        if to_surface:
+            tip = start + seen * (mean + (1 - ROUND_MEAN) * round_share * radius) + (1 - seen) * stop
+            return min(max(tip, 0.0), float(self.length.max()))
+        inside = (ROUND_MEAN - 1 / 2) * round_share
+        tip = start + seen * mean + (1 - seen) * stop - (1 / 2 + seen * inside) * radius
+        return min(max(tip, 0.0), reach)
+
+
+def _turn_and_bend(
+    points: np.ndarray, normals: np.ndarray, way: np.ndarray, bend: np.ndarray, radius: float
+) -> np.ndarray:
+    """How a limb from the origin in a direction turns aside there, and how it bends, (2, 3) float array."""
+    length, across = points @ way, cross(normals, way)
+    powers, miss = np.stack([length, length**2 / 2], axis=1), dot(across, points)
+    left = miss - powers[:, 1] * (across @ bend)
+    weight = (length <= quantile(length, END_REACH)) * radius**2 / (radius**2 + 4 * left**2 + TINY)
+    frame: Floats = plane_axes(way[None])[0].T
+    ask = (powers[:, :, None] * (across @ frame.T)[:, None]).reshape(-1, 4)
+    stiff = END_BENDING / 2 * (weight @ powers**2).repeat(2)
+    found: Floats = np.linalg.solve((weight[:, None] * ask).T @ ask + np.diag(stiff + TINY), (weight * miss) @ ask)
+    return found.reshape(2, 2) @ frame
+
+
+def _replanted(skeleton: Skeleton, grown: list[_Grown]) -> Skeleton:
+    """With new ends instead of those that were cut."""
+    m = len(skeleton.vertices)
+    members = Members(skeleton.vertex_of_point, m)  # those without a normal, too
+    keep, owner = np.ones(m, bool), skeleton.vertex_of_point.copy()
+    low, high = axis_box(skeleton.points[skeleton.supporting_points])
+    edges, known = [skeleton.edges], {name: [getattr(skeleton, name)] for name in ("radii", "confidence")}
+    planted = [np.clip(found.places, low, high) for found in grown]
+    for (path, cut, _, run), places in zip(grown, planted, strict=True):
+        gone, names = path[cut:], m + np.arange(len(places))
+        m += len(places)
+        keep[gone] = False
+        chain = np.concatenate([path[cut - 1 : cut], names])
+        edges.append(np.column_stack([chain[:-1], chain[1:]]))
+        for values in known.values():
+            values.append(np.full(len(places), quantile(values[0][run])))
+        lost = members.of(gone)
+        near = cKDTree(np.concatenate([skeleton.vertices[chain[:1]], places])).query(skeleton.points[lost])[1]
+        owner[lost] = chain[near]
+    keep = np.concatenate([keep, np.ones(m - len(keep), bool)])
+    number, links = np.cumsum(keep) - 1, np.concatenate(edges)
+    links = number[links[keep[links].all(axis=1)]]
+    known["vertices"] = [skeleton.vertices, *planted]
+    made = {name: np.concatenate(values)[keep] for name, values in known.items()}
+    made |= dict(edges=links, vertex_of_point=np.append(number, -1)[owner])
+    replanted = replace(skeleton, **NOT_MEASURED | made)
+    section = measure_sections(replanted).radius
+    new = np.flatnonzero(keep) >= len(skeleton.vertices)
+    # without points a vertex has no section, and keeps the radius of the run
+    return with_fields(replanted, radii=np.where(new & (section > 0), section, replanted.radii))

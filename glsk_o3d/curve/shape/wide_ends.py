@@ -1,0 +1,90 @@
+"""Lead the curve straight through a wide end: a paddle, a pan, a sign on a pole."""
+
+import numpy as np
+from scipy.sparse.csgraph import dijkstra
+
+from ...data.skeleton import Skeleton
+from ...geometry.groups import group_sum
+from ...geometry.near_links import linked
+from ...geometry.neighbourhoods import nearest_neighbours
+from ...geometry.vectors import TINY, norm
+from ..axis.sections import Sections, VertexPoints, measure_sections
+from ..diagnostics import MAJORITY, STUB_LENGTH
+from ..topology.collapse import with_fields
+from ..topology.evidence import SurfaceGraph
+
+# fitted: half width of a wide end over that of its neck, and of a body over that of its handle, at least; with 2 (ends)
+# and 4 (handles) the scores are the same
+WIDE_NECK = 3.0
+
+
+def level_wide_ends(skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
+    """Move the vertices of wide ends to the means of bands of the surface that are equally far from the neck.
+
+    A disc has no axis: every way through it is in the middle of its own sections, so that a fit leaves it as it is. Nor
+    is the way ahead told by the limb, which meets a pan at an angle. The bands know the way from the neck to the rim,
+    and their means hardly depend on the points. Balls on a neck are wide ends, too.
+    """
+    width = half_widths(VertexPoints(skeleton), measure_sections(skeleton))
+    leaf = skeleton.degree == 1
+    for branch in skeleton.branches:
+        for path in (branch, branch[::-1]):
+            if leaf[path[-1]] and len(run := _wide_end(path, skeleton.vertices, width, bool(leaf[path[0]]))):
+                skeleton = _levelled(skeleton, run, surface)
+    return skeleton
+
+
+def half_widths(cloud: VertexPoints, sections: Sections) -> np.ndarray:
+    """Half width of the section at every vertex, or the distance to its points or those beside it, (M,) float array.
+
+    Where normals mean nothing, as on scan lines, points are farther away than the half width.
+    """
+    away, (a, b) = cloud.distance, cloud.skeleton.edges.T
+    width = np.fmax(sections.half_width, away)
+    np.maximum.at(width, np.concatenate([a, b]), away[np.concatenate([b, a])])
+    return width
+
+
+def _wide_end(path: np.ndarray, vertices: np.ndarray, width: np.ndarray, other: bool) -> np.ndarray:
+    """The last vertices of a path, from the neck before its widest place on; none if they are no wide end.
+
+    The widest place is near the leaf. The neck is the narrowest place a half width or more before that, at most a
+    third as wide, not much farther from the leaf than the end is wide, and not at an `other` leaf, since rims are
+    narrow, too. Where a limb widens, points of one side only may belong to the curve. Behind the neck there are two
+    vertices or more.
+    """
+    wide, places = width[path], vertices[path]
+    top = int(np.argmax(np.where(norm(places - places[-1]) < STUB_LENGTH * wide, wide, 0)))
+    thin = (WIDE_NECK * wide[:top] <= wide[top]) & (norm(places[:top] - places[top]) >= wide[top])
+    thin &= (not other) | (WIDE_NECK * norm(places[:top] - places[0]) >= wide[top])
+    thin &= norm(places[:top] - places[-1]) < STUB_LENGTH * wide[top]
+    if not thin.any():
+        return path[:0]
+    neck = np.argmin(np.where(thin, wide[:top], np.inf))
+    return path[neck:] if len(path) - neck > 3 else path[:0]
+
+
+def _levelled(skeleton: Skeleton, run: np.ndarray, surface: SurfaceGraph) -> Skeleton:
+    """The skeleton with a run, whose first two vertices are the neck and stay, at the means of bands behind it."""
+    vertex, k = skeleton.vertex_of_point[surface.supporting], surface.neighbours.shape[1]
+    rows = np.flatnonzero(np.isin(vertex, run))
+    neck = np.flatnonzero(np.isin(vertex[rows], run[:2]))
+    if not len(neck):
+        return skeleton
+    index = np.full(len(vertex), -1)
+    index[rows] = np.arange(len(rows))
+    pairs = np.column_stack([np.repeat(np.arange(len(rows)), k), index[surface.neighbours[rows]].ravel()])
+    away = dijkstra(linked(surface.points[rows], pairs[pairs[:, 1] >= 0]), indices=neck, min_only=True)
+    reached, n = np.isfinite(away), len(run) - 2
+    if reached.mean() < MAJORITY:  # a bridge joins them, and no surface
+        return skeleton
+    away, points = away[reached], surface.points[rows[reached]]
+    band = np.minimum((n * away / max(away.max(), TINY)).astype(int), n - 1)
+    count = np.bincount(band, minlength=n)
+    mean = group_sum(points, band, n) / np.maximum(count, 1)[:, None]
+    some = np.flatnonzero(count)
+    vertices, owner = skeleton.vertices.copy(), skeleton.vertex_of_point.copy()
+    vertices[run[2:]] = np.column_stack([np.interp(np.arange(n), some, column) for column in mean[some].T])
+    owned = np.flatnonzero(np.isin(owner, run[2:]))
+    owner[owned] = run[2 + band[nearest_neighbours(points, 1, of=skeleton.points[owned])[1][:, 0]]]
+    return with_fields(skeleton, vertices=vertices, vertex_of_point=owner)

@@ -1,0 +1,1 @@
+"""Parts that have no surface: which they are, and paths through their points."""

@@ -1,0 +1,72 @@
+"""Set parts without a surface aside while a skeleton is refined by the surface around it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ...data.skeleton import OF_VERTICES, Skeleton
+from ...geometry.near_links import spanning
+from ...geometry.vectors import norm
+from ..diagnostics import MAJORITY
+from ..topology.air import CROSSING_HOPS
+from ..topology.collapse import some_vertices
+from .detect import REGION_VERTICES, UNSURE_CONFIDENCE, SpacedPoints, mostly_on_loops, without_surface
+
+
+class Aside(NamedTuple):
+    """What of a skeleton was set aside."""
+
+    whole: Skeleton
+    gone: np.ndarray  # (M,) bool, its vertices without a surface
+    rows: np.ndarray  # input points of the others
+
+    @classmethod
+    def of(cls, skeleton: Skeleton, least: float) -> Aside | None:
+        """The parts that a Tracer will trace, if they have most points of a large skeleton, such as a tree's crown.
+
+        No surface around them says anything, and there are thousands of them to be asked about. `least` is as in
+        `without_surface`.
+        """
+        cloud, unsure = SpacedPoints(skeleton), skeleton.confidence < UNSURE_CONFIDENCE
+        if len(unsure) <= REGION_VERTICES or not _most(cloud, unsure) or mostly_on_loops(skeleton, unsure):
+            return None
+        gone = without_surface(cloud, least)
+        if not _most(cloud, gone) or mostly_on_loops(skeleton, gone):
+            return None
+        for _ in range(CROSSING_HOPS):  # what grows where a part was severed is near, and will be traced, too
+            gone[skeleton.edges[~gone[skeleton.edges].all(axis=1)]] = False
+        owner = skeleton.vertex_of_point
+        return cls(skeleton, gone, np.flatnonzero((owner >= 0) & ~gone[owner]))
+
+    def rest(self) -> Skeleton:
+        """What is left, with its points alone."""
+        whole, left, rows = self.whole, ~self.gone, self.rows
+        number = np.cumsum(left) - 1
+        made = dict(points=whole.points[rows], normals=whole.normals[rows])
+        made |= dict(vertex_of_point=number[whole.vertex_of_point[rows]], **some_vertices(whole, left))
+        return replace(whole, edges=number[whole.edges[left[whole.edges].all(axis=1)]], **made)
+
+    def put_back(self, rest: Skeleton) -> Skeleton:
+        """The refined rest, and behind its vertices those set aside, as trees tied to where it is nearest."""
+        whole, gone, m = self.whole, self.gone, len(rest.vertices)
+        number = m - 1 + np.cumsum(gone)
+        ends = whole.edges[gone[whole.edges].any(axis=1)]
+        ties, stays = number[ends], ~gone[ends]
+        if stays.any():
+            ties[stays] = cKDTree(rest.vertices).query(whole.vertices[ends[stays]])[1]
+        piece = np.append(rest.component_of_vertex, rest.n_components + np.arange(gone.sum()))
+        if len(ties):
+            ties = ties[spanning(piece, ties, norm(whole.vertices[ends[:, 1]] - whole.vertices[ends[:, 0]]))]
+        owner = np.where(whole.vertex_of_point >= 0, number[whole.vertex_of_point], -1)
+        owner[self.rows] = rest.vertex_of_point
+        aside, made = some_vertices(whole, gone), dict[str, Any](points=whole.points, normals=whole.normals)
+        made |= {name: np.concatenate([getattr(rest, name), aside[name]]) for name in ("vertices", *OF_VERTICES)}
+        return replace(rest, **made, edges=np.concatenate([rest.edges, ties]), vertex_of_point=owner)
+
+
+def _most(cloud: SpacedPoints, some: np.ndarray) -> bool:
+    return bool(cloud.count[some].sum() > MAJORITY * cloud.count.sum())

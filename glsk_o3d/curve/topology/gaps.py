@@ -1,0 +1,121 @@
+"""Bridge the gaps that a scan or the contraction leaves in an object."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse.csgraph import dijkstra
+
+from ...data.decisions import QUESTIONS, Decision
+from ...data.skeleton import Skeleton
+from ...geometry.groups import quantile
+from ...geometry.near_links import linked
+from ...geometry.polylines import arc_lengths
+from ...geometry.vectors import TINY, dot, norm
+from .air import HEADING_RADII
+from .collapse import with_gaps
+from .evidence import LEAST_INSIDE, Evidence
+from .spurs import NOT_BESIDE
+
+# All fitted but where it says otherwise.
+BRIDGE_REACH = 6.0  # longest gap, in radii of the end
+BRIDGE_COSINE = 0.5  # least cosine between the bridge and the end
+DETOUR = 3.0  # least way along the skeleton over that across the gap; less would make a loop of nothing
+BRIDGE_SAMPLES = np.arange(1, 8)[:, None] / 8  # derived: places along a bridge, evenly
+
+
+class _End(NamedTuple):
+    leaf: int
+    place: np.ndarray
+    outward: np.ndarray
+    radius: float
+
+
+def bridge_gaps(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Decision]]:
+    """Join ends with other ends, or with the side of something, where the object probably goes on; the surest first.
+
+    A gap is bridged by an edge from a probability of `least` on. There is one decision for each end that points at
+    something, of its likeliest bridge.
+    """
+    found = [(QUESTIONS["gap"].probability(facts), pair) for pair, facts in gap_facts(skeleton, evidence)]
+    used: set[int] = set()
+    decisions, bridges = [], []
+    for chance, pair in sorted(found, key=lambda each: -each[0]):
+        if used.isdisjoint(pair):
+            place = skeleton.vertices[list(pair)].mean(axis=0)
+            decisions.append(Decision("gap", tuple(place.tolist()), chance, chance >= least))
+            used.update(pair)
+            if chance >= least:
+                bridges.append(sorted(pair))
+    if not bridges:
+        return skeleton, decisions
+    bridged = replace(skeleton, edges=np.unique(np.concatenate([skeleton.edges, bridges]), axis=0))
+    return with_gaps(bridged, skeleton.vertices[np.array(bridges)]), decisions
+
+
+def gap_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[tuple[int, int], dict[str, float]]]:
+    """What speaks for and against a bridge, for every end and the places that it points at: (leaf, vertex), and facts.
+
+    The facts are: the least winding number along the bridge, over the median on the skeleton; and how far the end is
+    closed: the flux of its outward normals through its cross-section, 1 for a cap and 0 for a tube cut open, as a
+    logarithm.
+    """
+    ends = list(_ends(skeleton))
+    if not ends or not len(evidence.points):
+        return
+    typical = quantile(evidence.winding_along(skeleton))
+    if typical < LEAST_INSIDE:
+        return  # parts too thin to have an inside, which could go on across a gap
+    leaves = [end.leaf for end in ends]
+    along = dijkstra(linked(skeleton.vertices, skeleton.edges), indices=leaves)
+    found = [(end, other) for i, end in enumerate(ends) for other in _aims(skeleton, end, along[i], leaves, along)]
+    if not found:
+        return
+    across = [skeleton.vertices[other] - end.place for end, other in found]
+    samples = [end.place + BRIDGE_SAMPLES * way for (end, *_), way in zip(found, across, strict=True)]
+    winding = evidence.winding(np.concatenate(samples)).reshape(len(found), -1).min(axis=1) / typical
+    for (end, other), least in zip(found, winding, strict=True):
+        facts = dict(winding=float(np.clip(least, -0.5, 1.3)), cap=float(np.log(_cap(end, evidence) + 0.1)))
+        yield (end.leaf, other), facts
+
+
+def _aims(skeleton: Skeleton, end: _End, travelled: np.ndarray, leaves: list[int], along: np.ndarray) -> Iterator[int]:
+    """Vertices that an end points at across a gap: the nearest other end, and the nearest place else."""
+    across = skeleton.vertices - end.place
+    away = np.maximum(norm(across), TINY)
+    cosine = across @ end.outward / away
+    free = skeleton.degree == 1
+    gap = away - np.where(free, 0, skeleton.radii)
+    aims = (gap < BRIDGE_REACH * end.radius) & (cosine > BRIDGE_COSINE) & (skeleton.degree > 0)
+    aims &= travelled > DETOUR * away
+    cost = gap + away * (1 - cosine) / 2
+    # what the way by an end leads to is behind it, and not asked for itself
+    behind = ((away[leaves][:, None] + along)[aims[leaves]] < DETOUR * away).any(axis=0)
+    for kind in (free, ~free & ~behind):
+        some = np.flatnonzero(aims & kind)
+        if len(some):
+            yield int(some[np.argmin(cost[some])])
+
+
+def _cap(end: _End, evidence: Evidence) -> float:
+    """Flux of the normals that look out of an end, through its cross-section, at least 0."""
+    offset = evidence.points - end.place
+    ahead = offset @ end.outward
+    beside = dot(offset, offset) - ahead**2
+    near = (ahead > -end.radius) & (ahead < NOT_BESIDE * end.radius)
+    near &= beside < (NOT_BESIDE * end.radius) ** 2
+    facing = np.maximum(evidence.normals[near] @ end.outward, 0)
+    return float(evidence.areas[near] @ facing / max(np.pi * end.radius**2, TINY))
+
+
+def _ends(skeleton: Skeleton) -> Iterator[_End]:
+    """Leaves, with the directions in which their branches end, and the median radii of these."""
+    for branch in skeleton.branches:
+        radius = quantile(skeleton.radii[branch])
+        for path in (branch, branch[::-1]):
+            if skeleton.degree[path[0]] == 1 and radius > 0:
+                places = skeleton.vertices[path]
+                back = int(np.searchsorted(arc_lengths(places)[1:], HEADING_RADII * radius)) + 1
+                way = places[0] - places[min(back, len(path) - 1)]
+                yield _End(int(path[0]), places[0], way / max(np.linalg.norm(way), TINY), radius)

@@ -1,0 +1,318 @@
+"""Points: a cloud in its working frame, and which of its points speak for which."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from typing import Any, TypeVar
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..errors import StageError
+from ..geometry.area_sampling import SurfaceSample, sample_by_area, vertices_mislead
+from ..geometry.frame import Frame, not_finite, to_working_frame
+from ..geometry.grid_sampling import sample_cloud
+from ..geometry.neighbourhoods import principal, row_medians
+from ..geometry.rows import reach_next_rows
+from ..geometry.vectors import TINY, Ints, finite_rows
+from ..interop.clouds import cloud_counts, surface_mesh, to_point_cloud
+from .report import Report
+
+Some = TypeVar("Some", bound="Representatives")
+
+# Fitted: median sphericity of clean neighbourhoods at most, and of nothing but noise.
+CLEAN_SPHERICITY, NOISE_SPHERICITY = 0.2, 0.35
+RIDGE_NEIGHBOURS = 32  # fitted: among which a ridge is sought: more than for rings, a noisy shell is thick
+
+ENOUGH = 2400  # fitted: points on a body without thin parts; fewer are not thinned
+MOST_CONTRACTED = 25000  # speed: points of most clouds that are contracted
+
+
+def default_k(n: int) -> int:
+    """Neighbours per point, itself included: 16 from 4096 points on, fewer by the cube root below, at least 8.
+
+    In a sparse cloud 16 neighbours would reach across thin parts.
+    """
+    return min(int(np.clip(np.floor(16 * np.cbrt(n / 4096) + 0.5), 8, 16)), n)
+
+
+def default_size(n: int) -> int:
+    """Points to contract: at most 25000, but 64 times the square root of their number from 152588 points on.
+
+    More points make the axis hardly more exact, since neither noise nor the thickness of parts shrinks with their
+    spacing; they only cost time.
+    """
+    size: int = max(MOST_CONTRACTED, round(64 * np.sqrt(n)))
+    return min(n, size)
+
+
+@dataclass(frozen=True, eq=False)
+class Representatives:
+    """What `Points` and `Contraction` have in common: who speaks for whom.
+
+    Arrays over the N input points are in the user's order and units. Everything else lives in the working frame: m
+    distinct points in Morton order, of which n survive.
+    """
+
+    points: np.ndarray
+    representative_of_point: np.ndarray
+    outlier: np.ndarray
+    sampled: np.ndarray
+    frame: Frame
+    cloud: np.ndarray
+    weight: np.ndarray
+    merged: np.ndarray
+    noise: np.ndarray
+    normals: np.ndarray
+    survivors: Ints
+    representative: np.ndarray
+    report: Report
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({len(self)} of {len(self.points)} points left)"
+
+    def __len__(self) -> int:
+        return len(self.survivors)
+
+    @property
+    def survivor_of_point(self) -> np.ndarray:
+        """For every input point the survivor that speaks for it, (N,) int array; -1 for dropped points."""
+        return self._of_points(self.representative)
+
+    @property
+    def point_of_survivor(self) -> np.ndarray:
+        """For every survivor the first input point that it is, (n,) int array."""
+        return self._point_of_row[self.survivors]
+
+    @property
+    def _point_of_row(self) -> np.ndarray:
+        """For every distinct point the first input point that it is, (m,) int array."""
+        points = np.flatnonzero(self.sampled)[::-1]  # of several writes the last one stays
+        first = np.empty(len(self.cloud), int)
+        first[self.representative_of_point[points]] = points
+        return first
+
+    @property
+    def has_normal(self) -> np.ndarray:
+        """Input points with a normal, (N,) bool array: those that determine the surface, and their copies."""
+        if self.report.is_sampled or self.report.n_by_area:
+            return self.sampled
+        return (self.representative_of_point >= 0) & ~self.outlier
+
+    def merged_into(self: Some, representative: np.ndarray, **changes: Any) -> Some:
+        """The same with survivors merged into others, each into the `representative` (n,) of it; a survivor is its own.
+
+        `changes` are the fields over the survivors that are left.
+        """
+        kept = representative == np.arange(len(representative))
+        left = (np.cumsum(kept) - 1)[representative]
+        return replace(self, survivors=self.survivors[kept], representative=left[self.representative], **changes)
+
+    def _of_points(self, values: np.ndarray) -> np.ndarray:
+        """Ints (m,) of distinct points for every input point, -1 for dropped ones."""
+        return np.append(values, -1)[self.representative_of_point]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Points(Representatives):
+    """A cloud on its way to its rings.
+
+    Filters that prepare a cloud merge copies, noisy points and near points, and set outliers aside. A remaining point
+    represents the points merged into it, and the outliers nearest to it.
+
+    Attributes
+    ----------
+    points : (N, 3) float64 array
+        The input; of a mesh that is sampled its vertices, and the sample after them.
+    representative_of_point : (N,) int array
+        Row of `cloud` of each input point; -1 if it is not finite.
+    outlier, sampled : (N,) bool array
+        Outliers, which the nearest distinct point represents; and points that determine the surface: no outliers, one
+        of copies, and only the sample of a large cloud.
+    frame : Frame
+    cloud : (m, 3) float64 array
+        Distinct input points; noisy ones denoised, and where there are many, means of several.
+    weight, merged : (m,) float64 array
+        Number of input points that each represents, without copies, and of distinct points that it is the mean of.
+    noise : (m,) float64 array
+        Share of noise in the neighbourhood of each, from 0 to 1.
+    normals : (m, 3) float64 array
+        Unit normals of the tangent planes before points were moved to ridges, up to their sign.
+    survivors : (n,) int array
+        Remaining rows of `cloud`, ascending; all until the cloud is thinned.
+    representative : (m,) int array
+        The survivor (0 .. n-1) that each distinct point was merged into; itself for a survivor.
+    neighbours : (n, k) int array
+        The nearest survivors of each, nearest first after the point itself; as many as reach into the next rows where
+        points lie in rows, such as scan lines.
+    spread : (n, 3) float64 array
+        Sums of squares along the principal axes of these neighbourhoods, ascending.
+    ring_normals : (n, 3) float64 array
+        Unit normals of the planes of these neighbourhoods, in which the rings lie.
+    report : Report
+
+    Examples
+    --------
+    >>> from glsk_o3d import OutlierRemover, Sampler
+    >>> from glsk_o3d.samples import torus
+    >>> points = (Sampler() | OutlierRemover())(torus(500).points)
+    >>> len(points), points.neighbours.shape, int(points.outlier.sum())
+    (500, (500, 8), 0)
+    """
+
+    neighbours: np.ndarray
+    spread: np.ndarray
+    ring_normals: np.ndarray
+
+    @property
+    def coordinates(self) -> np.ndarray:
+        """Positions of the survivors in the user's units, (n, 3) float64 array."""
+        return self.frame.out_of(self.cloud[self.survivors])
+
+    def to_point_cloud(self) -> Any:
+        """The survivors as an ``open3d.geometry.PointCloud``."""
+        return to_point_cloud(self.coordinates)
+
+    @classmethod
+    def of(
+        cls, cloud: Any, size: Callable[[int], int] = int, by: str = "spread", drop: bool = False, sample: Any = "auto"
+    ) -> Points:
+        """The points of a cloud, or about `size(n)` of n from the cells of a grid if n is more than twice as large.
+
+        Of a mesh they are those `on_surface`, if there are some, and each vertex follows the nearest.
+        InvalidCloudError as of `RingBuilder`.
+        """
+        points, _ = mesh = surface_mesh(cloud)
+        finite = finite_rows(points)
+        if not (drop or finite.all()):
+            raise not_finite(int((~finite).sum()), len(points), int(finite.argmin()))
+        counts, n, dropped = cloud_counts(cloud, finite)
+        given = points if finite.all() else points[finite]
+        surface = on_surface(mesh, sample)[0]
+        if len(surface):
+            kept, position, counts = sample_cloud(surface, size(len(surface)))
+            kept, position = kept + len(given), np.append(position[cKDTree(surface).query(given)[1]], position)
+            points, finite = np.append(points, surface, axis=0), np.append(finite, np.ones(len(surface), bool))
+        else:
+            kept, position, counts = sample_cloud(given, size(n), counts)
+        kept, place = np.flatnonzero(finite)[kept], np.full(len(points), -1)
+        place[finite] = position
+        report = Report(n_input=n + dropped, n_dropped=dropped, n_by_area=len(surface), n_sampled=len(kept))
+        return cls._of_rows(points, kept, place, counts, by, report)
+
+    @classmethod
+    def _of_rows(
+        cls,
+        points: np.ndarray,
+        kept: np.ndarray,
+        place: np.ndarray,
+        counts: np.ndarray,
+        by: str,
+        report: Report,
+        neighbours: np.ndarray | None = None,
+    ) -> Points:
+        """Those of the rows `kept` (s,) of a cloud, each of which stands for `counts` (s,) points.
+
+        `place` (N,) is the position in `kept` of what stands for each input point, -1 for none. `neighbours` (s, k), if
+        they are known, are positions in `kept` that are all distinct.
+        """
+        frame, cloud, first, row, weight, neighbours = to_working_frame(points[kept], counts, by, default_k, neighbours)
+        sampled = np.zeros(len(points), bool)
+        sampled[kept[first]] = True
+        return cls(
+            points=points,
+            representative_of_point=np.append(row, -1)[place],
+            outlier=np.zeros(len(points), bool),
+            sampled=sampled,
+            frame=frame,
+            weight=weight,
+            merged=np.ones(len(cloud)),
+            report=report,
+            **_measured(cloud, neighbours),
+        )
+
+    def without(self, gone: np.ndarray, neighbours: np.ndarray) -> Points:
+        """These without the outliers in the (m,) bool array, in the frame of the rest.
+
+        `neighbours` are those of the remaining rows, as positions among these.
+        """
+        first, aside = self.point_of_survivor, self._of_points(gone) > 0
+        kept, position = np.flatnonzero(self.sampled & ~aside), np.full(len(self.points), -1)
+        position[kept] = np.arange(len(kept))
+        left = position[first]
+        place = np.where(aside, -1, self._of_points(left))
+        place[kept] = np.arange(len(kept))
+        by = "box" if self.frame.mean is None else "spread"
+        rows, known, weight = left[~gone], np.empty_like(neighbours), np.empty(len(kept))
+        known[rows], weight[rows] = rows[neighbours], self.weight[~gone]
+        points = self._of_rows(self.points, kept, place, weight, by, self.report, known)
+        nearest = np.full(len(gone), -1)
+        nearest[gone] = cKDTree(points.cloud).query(points.frame.into(self.points[first[gone]]))[1]
+        representative = np.where(aside, self._of_points(nearest), points.representative_of_point)
+        return replace(points, representative_of_point=representative, outlier=self.outlier | aside)
+
+    def aside(self, rows: np.ndarray) -> Points:
+        """These with some rows, (m,) bool array, counted as outliers."""
+        aside = self._of_points(rows) > 0
+        return replace(self, outlier=self.outlier | aside, sampled=self.sampled & ~aside)
+
+    def check_whole(self, filter: Any) -> None:
+        """Raise StageError if they were thinned: the filter needs all of them."""
+        if len(self) < len(self.cloud):
+            raise StageError(f"{type(filter).__name__} comes before Thinner, which has merged points already")
+
+    def remade(self, row: np.ndarray, cloud: np.ndarray, neighbours: np.ndarray, **changes: Any) -> Points:
+        """These with new rows: `row` (m,) is the new row of each old one. Neighbourhoods are measured anew.
+
+        `changes` are other fields over the new rows.
+        """
+        made = _measured(cloud, neighbours) | changes
+        return replace(self, representative_of_point=self._of_points(row), **made)
+
+    def common(self) -> dict[str, Any]:
+        """The fields of `Representatives`, for the next state."""
+        return {field.name: getattr(self, field.name) for field in fields(Representatives)}
+
+
+def _measured(cloud: np.ndarray, neighbours: np.ndarray) -> dict[str, Any]:
+    """Rows that all survive, with what their neighbourhoods are like, as fields of `Points`."""
+    neighbours = reach_next_rows(cloud, neighbours)
+    spread, normals = principal(cloud, neighbours)
+    everybody = np.arange(len(cloud))
+    return dict(
+        cloud=cloud,
+        noise=noise_share(spread, neighbours),
+        normals=normals,
+        survivors=everybody,
+        representative=everybody,
+        neighbours=neighbours,
+        spread=spread,
+        ring_normals=normals,
+    )
+
+
+def on_surface(mesh: tuple[np.ndarray, np.ndarray], sample: Any = "auto") -> SurfaceSample:
+    """The points that stand for a mesh, by the option `sample` of the Sampler: none where its vertices do."""
+    if sample == "auto" and vertices_mislead(mesh, default_k, ENOUGH):
+        sample = MOST_CONTRACTED
+    return sample_by_area(*mesh, 0 if isinstance(sample, str) else int(sample))
+
+
+def surface_points(cloud: Any) -> np.ndarray:
+    """The points of a cloud, or those that stand for a mesh by default, (N, 3) float64 array."""
+    mesh = surface_mesh(cloud)
+    places = on_surface(mesh)[0]
+    return places if len(places) else mesh.vertices
+
+
+def noise_share(spread: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
+    """How far the neighbourhoods of a cloud are noise, from 0 to 1, (n,) float array.
+
+    That is how much they fill space: the sphericity, the least over the largest principal spread, smoothed by the
+    median, is near 0 on a surface and along a curve, however dense, and 1 in a ball of noise (Demantke et al. 2011,
+    "Dimensionality based scale selection in 3D lidar point clouds"); from 0.2 to 0.35 it is mapped to 0 to 1.
+    """
+    sphericity = row_medians((spread[:, 0] / np.maximum(spread[:, 2], TINY)).take(neighbours))
+    rise = (sphericity - CLEAN_SPHERICITY) / (NOISE_SPHERICITY - CLEAN_SPHERICITY)
+    return np.clip(rise, 0, 1)

@@ -1,0 +1,167 @@
+"""OutlierRemover: points -> those that are no outliers, single points far from all others or clusters that float."""
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from ..data.points import Points
+from ..geometry.frame import MIN_POINTS
+from ..geometry.groups import component_labels
+from ..geometry.neighbourhoods import local_outlier_ratio, mean_distances, nearest_neighbours, principal, row_medians
+from ..geometry.vectors import TINY
+from ..parameters import documented, parameter
+from ..pipeline import Filter, Watch
+
+# All fitted, on clouds with outliers of 1 to 10 %, sparse limbs and crowns.
+MOST_ROUNDS = 20  # speed: clouds need less than ten, but spirals that get ever sparser one for every point
+DENSEST_HOPS = 4  # from neighbour to neighbour, within which the densest place is looked for
+FLOATING_RATIO = 5.0  # times as far from its neighbours as points there are: not for a surface that is only uneven
+FLOATING_SHARE = 0.1  # of all points that can float at most; more are a part of the object
+LIMB_NEIGHBOURS = 64  # among points far from theirs, that a limb of an object is longer than thick with
+MIXED_SHARE = 0.01  # of all points that surely are mixed pixels if there are any; fewer are at ends of a scan
+# least second and third over first principal spread of points that fill space
+FILLED_SECOND, FILLED_THIRD = 0.35, 0.1
+MIXED_OR_TWIGS = (
+    "sparse points beside a surface may be mixed pixels of a depth camera or twigs, which cannot be told apart, and "
+    "are kept: if they are of a camera, filter its flying pixels first"
+)
+
+
+@documented
+@dataclass(frozen=True, kw_only=True)
+class OutlierRemover(Filter[Points]):
+    """Set outliers aside: later filters ignore them, but each belongs to the vertex of the nearest point.
+
+    An outlier is far from its neighbours, relative to their spacing, in a small isolated cluster, or a mixed pixel of a
+    depth camera, between the edge of a surface and what is behind it. Do not call
+    Open3D's ``remove_statistical_outlier`` first: it also removes points of sparse limbs.
+
+    References
+    ----------
+    Breunig et al. 2000, LOF: identifying density-based local outliers.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from glsk_o3d import Sampler
+    >>> from glsk_o3d.samples import torus
+    >>> points = (Sampler() | OutlierRemover())(np.append(torus(500).points, [[0, 0, 1]], axis=0))
+    >>> np.flatnonzero(points.outlier)
+    array([500])
+    """
+
+    consumes: ClassVar[type] = Points
+    produces: ClassVar[type] = Points
+
+    outlier_factor: float = parameter(
+        2.5,
+        "Ratio of a point's distance to its neighbours over theirs above which it is an outlier. 0 keeps all.",
+        low=0,
+    )
+
+    def _run(self, points: Points, watch: Watch | None) -> Points:
+        if not self.outlier_factor:
+            return points
+        points.check_whole(self)
+        cloud, weight, neighbours, factor = points.cloud, points.weight, points.neighbours, self.outlier_factor
+        distance = mean_distances(cloud, neighbours)
+        mixed, doubtful = mixed_pixels(points, distance, factor)
+        left, neighbours = inliers(cloud, weight, neighbours, distance, mixed, factor, MIN_POINTS)
+        if doubtful:
+            points = replace(points, report=points.report.with_warning(MIXED_OR_TWIGS))
+        if len(left) == len(points):
+            return points
+        gone = np.ones(len(points), bool)
+        gone[left] = False
+        rest = points.without(gone, neighbours)
+        return replace(rest, report=replace(rest.report, n_mixed=int(mixed.sum())))
+
+
+def inliers(
+    points: np.ndarray,
+    weight: np.ndarray,
+    neighbours: np.ndarray,
+    distance: np.ndarray,
+    mixed: np.ndarray,
+    factor: float,
+    least: int,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The points left when those far from all others are set aside, round by round.
+
+    An outlier is `factor` times farther from its neighbours than these are from theirs, by the mean `distance` (n,).
+    Where there are many, its neighbours are outliers, too; then what floats in space goes, see `in_floating_cluster`.
+    At least `least` points are left. `mixed` pixels (n,) go in the first round. Returned are the rows (m,) of those
+    left, ascending, and their nearest neighbours among these, (m, k).
+    """
+    left = np.arange(len(points))
+    for _ in range(MOST_ROUNDS):  # what is left of a cluster stands out once the rest is gone
+        # as near as the neighbours would be if all were there
+        mean = distance / np.sqrt(weight[left].take(neighbours).mean(axis=1))
+        found = (local_outlier_ratio(mean, neighbours) > factor) | mixed[left]
+        if mean.max() > FLOATING_RATIO * mean.min():  # else none can float
+            found |= in_floating_cluster(points[left], weight[left], mean, neighbours)
+        keep = np.flatnonzero(~found)
+        if len(keep) == len(left) or len(keep) < least:
+            break
+        left, index = left[keep], np.cumsum(~found) - 1
+        k = min(neighbours.shape[1], len(left))
+        changed = np.flatnonzero(found[neighbours[keep]].any(axis=1))
+        distance, neighbours, there = distance[keep], index[neighbours[keep, :k]], points[left]
+        near, neighbours[changed] = nearest_neighbours(there, k, of=there[changed])
+        distance[changed] = near[:, 1:].mean(axis=1)
+    return left, neighbours
+
+
+def mixed_pixels(points: Points, distance: np.ndarray, factor: float) -> tuple[np.ndarray, bool]:
+    """Points that hang between the edge of a surface and what a camera saw behind it, (n,) bool array.
+
+    A pixel on an edge has a depth between front and back. Such points are sparse beside a surface a few steps away,
+    and in none of their own, since their neighbourhoods are thick: with the ratio r of their distances to the spacing
+    of the surface, and neighbourhoods t times as thick as wide, ``r^2 sqrt(t) > factor``. There are some only where
+    more than a few are so by far, with ``r sqrt(t) > factor``. Where little of a cloud is a surface, or too much is
+    sparse, they may be twigs: then there are none, and the second result is True.
+    """
+    n, (third, second, first), neighbours = len(points), points.spread.T, points.neighbours
+    mean = distance / np.sqrt(points.weight.take(neighbours).mean(axis=1))
+    flat = (third < FILLED_THIRD * second) & (second > FILLED_SECOND * first)
+    none, few = np.zeros(n, bool), max(MIXED_SHARE * n, 2 * neighbours.shape[1])
+    thick = mean * np.sqrt(np.sqrt(third / np.maximum(second, TINY)))
+    densest = np.where(flat, mean, np.inf)
+    if np.count_nonzero(thick > factor * densest.min()) <= few:  # as in most clouds
+        return none, False
+    each = np.ascontiguousarray(neighbours.T)
+    for _ in range(DENSEST_HOPS + 1):
+        densest = densest.take(each).min(axis=0)
+    if np.count_nonzero(thick > factor * densest) <= few:
+        return none, False
+    found = thick > np.sqrt(factor) * densest
+    surface, sparse = np.count_nonzero(flat) / n, np.count_nonzero(found) / n
+    clear = surface >= 2 * FLOATING_SHARE and sparse < FLOATING_SHARE
+    return (found if clear else none), not clear
+
+
+def in_floating_cluster(points: np.ndarray, weight: np.ndarray, mean: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
+    """Points that float in space, among others that do, (n,) bool array.
+
+    They are far from their neighbours, a distance `mean` (n,), for what is some steps away, or anywhere if they are an
+    island; and together they fill space, or are a handful alone. A sparse surface is flat, and a sparse limb long.
+    """
+    densest, each = row_medians(mean.take(neighbours)), np.ascontiguousarray(neighbours.T)
+    for _ in range(DENSEST_HOPS):
+        densest = densest.take(each).min(axis=0)
+    island, sparse = np.zeros(len(points), bool), mean > FLOATING_RATIO * np.median(mean)
+    if sparse.any():
+        near = neighbours[:, 1:5]
+        ends = np.column_stack([np.repeat(np.arange(len(points)), near.shape[1]), near.ravel()])
+        part = component_labels(len(points), ends)
+        island = np.bincount(part, weight)[part] < FLOATING_SHARE * weight.sum()
+    far = np.flatnonzero((mean > FLOATING_RATIO * densest) | (island & sparse))
+    found = np.zeros(len(points), bool)
+    if len(far) > 3:
+        among = nearest_neighbours(points[far], min(LIMB_NEIGHBOURS, len(far)))[1]
+        third, second, first = principal(points[far], among)[0].T
+        found[far] = (second > FILLED_SECOND * first) & (third > FILLED_THIRD * first)
+    if island.any():
+        found |= island & sparse & (np.bincount(part)[part] < LIMB_NEIGHBOURS)
+    return found & (weight[found].sum() < FLOATING_SHARE * weight.sum())

@@ -1,0 +1,72 @@
+"""Tracer: thin parts without a surface -> shortest paths, and one rooted tree."""
+
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..curve.diagnostics import measured
+from ..curve.thin.detect import may_lack_surface
+from ..curve.thin.trace import trace
+from ..curve.topology.evidence import in_order
+from ..data.skeleton import Skeleton
+from ..geometry.vectors import AXES
+from ..parameters import documented, parameter
+from ..pipeline import Filter, Watch
+
+
+@documented
+@dataclass(frozen=True, kw_only=True)
+class Tracer(Filter[Skeleton]):
+    """Trace parts without a visible surface, such as twigs thinner than the point spacing; make one tree with a root.
+
+    Where the cloud shows no surface, shortest paths through the points replace the curve. With a `root` the result is
+    one tree: gaps are joined, loops opened, vertex 0 is the root, and every edge leads from parent to child. Without a
+    root, and with a surface everywhere, the skeleton is unchanged.
+
+    Warns
+    -----
+    SkeletonWarning
+        As of `Refiner`, about the skeleton with its traced parts.
+
+    References
+    ----------
+    Sato et al. 2000, TEASAR; Verroust and Lazarus 1999.
+
+    Examples
+    --------
+    >>> from glsk_o3d import skeletonize
+    >>> from glsk_o3d.samples import y_junction
+    >>> grown = skeletonize(y_junction(1000).points, root="z")
+    >>> grown.n_components, grown.n_loops, len(grown.leaves)
+    (1, 0, 3)
+    """
+
+    consumes: ClassVar[type] = Skeleton
+    produces: ClassVar[type] = Skeleton
+
+    surface: float = parameter(
+        0.65, "Share of points with a surface below which a region is traced as paths. 0 traces none.", low=0, high=1
+    )
+    root: str | Any = parameter(
+        None,
+        "Root of one tree: the lowest place along an axis, the thickest end, or the place nearest to a point. "
+        "None keeps parts and loops.",
+        type="point?",
+        choices=(*AXES, "thickest"),
+    )
+
+    def __post_init__(self) -> None:
+        # as plain text it can be compared, printed and written to files
+        if not isinstance(self.root, str | None):
+            with suppress(TypeError, ValueError, OverflowError):  # the check finds what is no point
+                point = np.asarray(self.root, float)
+                if point.shape == (3,):
+                    object.__setattr__(self, "root", ",".join(map(repr, point.tolist())))
+        super().__post_init__()
+
+    def _run(self, given: Skeleton, watch: Watch | None) -> Skeleton:
+        if self.root is None and not (self.surface and may_lack_surface(given, self.surface)):
+            return given  # as most are: sorting many points would take longer than all else
+        return in_order(lambda some: measured(trace(some, self.surface, self.root)), given, distinct=True)

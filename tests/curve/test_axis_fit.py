@@ -1,0 +1,382 @@
+"""The fit to the axis: closed forms of tubes and tori, and what it must not mind."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import cKDTree
+
+from glsk_o3d import Skeleton
+from glsk_o3d.curve import axis_fit
+from glsk_o3d.curve.axis.fit import HALF_SUPPORT
+from glsk_o3d.curve.axis.sections import measure_sections
+
+R = 0.15  # of the tubes
+
+
+def fit_axis(skeleton, passes, **options):
+    """Vertices, confidence and radii after a fit."""
+    fitted = axis_fit.fit_axis(skeleton, passes, **options)
+    return fitted.vertices, fitted.confidence, fitted.radii
+
+
+def tube(off=(0, 0), arc=2 * np.pi, m=20, around=24, along=200):
+    """Exact points and normals of a tube along x, or of an arc of it that is scanned from above; a curve off its axis.
+
+    Arc and curve are centred on the z axis; the lowest points of a half tube are a little above its axis.
+    """
+    angle = np.pi / 2 + arc * ((np.arange(around) + 0.5) / around - 0.5)
+    angle, x = (part.ravel() for part in np.meshgrid(angle, (np.arange(along) + 0.5) / along * 2 - 1))
+    normals = np.column_stack([0 * angle, np.cos(angle), np.sin(angle)])
+    points = R * normals + x[:, None] * [1, 0, 0]
+    x = np.linspace(-0.95, 0.95, m)
+    return path(np.column_stack([x, 0 * x + off[0], 0 * x + off[1]]), points, normals)
+
+
+def path(vertices, points, normals, closed=False):
+    m = len(vertices)
+    edges = [(i, i + 1) for i in range(m - 1)] + [(0, m - 1)] * closed
+    vertex = cKDTree(vertices).query(points)[1]
+    return Skeleton(vertices, sorted(edges), np.full(m, R), vertex, points, normals)
+
+
+def torus(big=0.4, small=0.1, m=48, shift=(0.03, 0.02)):
+    """A polygon beside the centre circle of a torus in the xy plane: wider by shift[0], higher by shift[1]."""
+    a, b = (part.ravel() for part in np.meshgrid(*[(np.arange(n) + 0.5) / n * 2 * np.pi for n in (6 * m, 20)]))
+    out = np.column_stack([np.cos(a), np.sin(a), 0 * a])
+    normals = np.cos(b)[:, None] * out + np.sin(b)[:, None] * [0, 0, 1]
+    t = np.arange(m) / m * 2 * np.pi
+    vertices = np.column_stack([np.cos(t), np.sin(t), 0 * t]) * (big + shift[0]) + [0, 0, shift[1]]
+    return path(vertices, big * out + small * normals, normals, closed=True)
+
+
+def off_axis(vertices):
+    return np.hypot(vertices[:, 1], vertices[:, 2])
+
+
+# ---- closed forms
+
+
+@pytest.mark.parametrize("off", [(0, 0.12), (0.05, 0.1), (0.2, -0.2)])
+def test_a_curve_anywhere_comes_to_the_axis_of_a_tube(off):
+    distance = [off_axis(fit_axis(tube(off), passes)[0]).max() for passes in range(5)]
+    assert distance[0] == pytest.approx(np.hypot(*off))
+    # every pass leaves no more than a good third
+    assert (np.diff(np.log(distance)) < -1).all()
+    assert off_axis(fit_axis(tube(off), 10)[0]).max() < 1e-4 * R
+
+
+@pytest.mark.parametrize("degrees", [180, 150, 120])
+def test_a_curve_comes_to_the_axis_of_an_arc_outside_its_points(degrees, placed):
+    """Not to the centroid; the axis of less than half a tube is beside all of its points."""
+    turned, turn = placed(tube((0, R), arc=np.deg2rad(degrees)))
+    assert off_axis(fit_axis(turned, 15)[0] @ turn.T).max() < 0.02 * R
+
+
+@pytest.mark.parametrize("degrees", [360, 180, 120])
+def test_settling_leaves_the_axis_of_an_arc_that_says_where_it_is(degrees):
+    assert off_axis(fit_axis(tube(arc=np.deg2rad(degrees)), 3, settle=True)[0]).max() < 0.02 * R
+
+
+@pytest.mark.parametrize("degrees", [20, 40, 60])
+def test_a_leaf_seen_from_one_side_keeps_its_curve(degrees):
+    """It is as thick as its arc is deep, and the normals meet far behind it."""
+    half = np.deg2rad(degrees) / 2
+    leaf = tube(arc=2 * half)
+    assert off_axis(fit_axis(leaf, 3)[0]).max() < R / 2  # near where they meet: it may not leave its points farther
+    place = fit_axis(leaf, 12, settle=True)[0][2:-2, 2]
+    # of the squared normals `across` stand across the others; the doubt, since they do not meet there, pulls as well
+    centroid, across = R * np.sin(half) / half, (1 - np.sin(2 * half) / (2 * half)) / 2
+    pull = 1 - across / (0.5 - 1 / np.pi)
+    assert (place < centroid).all()
+    assert (place > centroid * pull / (pull + across)).all()
+
+
+def test_a_polygon_comes_to_the_centre_circle_of_a_torus():
+    skeleton = torus()
+    moved, confidence, _ = fit_axis(skeleton, 6)
+    sagitta = 0.4 * (1 - np.cos(np.pi / 48))  # of a chord: the circle is between corners and middles
+    assert np.abs(np.hypot(moved[:, 0], moved[:, 1]) - 0.4).max() < sagitta
+    assert np.abs(moved[:, 2]).max() < 1e-4
+    assert confidence.min() > 0.9
+    # corners keep their places along the circle
+    turn = np.arctan2(moved[:, 1], moved[:, 0]) - np.arctan2(skeleton.vertices[:, 1], skeleton.vertices[:, 0])
+    assert np.abs((turn + np.pi) % (2 * np.pi) - np.pi).max() < 1e-3
+
+
+# ---- flat sections
+
+
+def strip(wide=0.3, thick=0.06, wiggle=0.0, n=6000, seed=0):
+    """A bar along x with a rectangular section of these half axes, and a curve that winds over its width."""
+    rng = np.random.default_rng(seed)
+    x, u = rng.uniform(-2, 2, n), rng.uniform(-1, 1, n)
+    face, sign = rng.random(n) < wide / (wide + thick), rng.choice([-1.0, 1.0], n)
+    y, z = np.where(face, wide * u, wide * sign), np.where(face, thick * sign, thick * u)
+    normals = np.where(face[:, None], [0, 0, 1], [0, 1, 0]) * sign[:, None]
+    along = np.linspace(-1.9, 1.9, 40)
+    curve = np.column_stack([along, wiggle * wide * np.sin(4 * along), 0 * along])
+    return path(curve, np.column_stack([x, y, z]), normals)
+
+
+@pytest.mark.parametrize("wiggle", [0, 0.4, 0.8])
+def test_the_curve_of_a_flat_bar_is_its_midline(wiggle):
+    """Whatever way it took over the width before: the places of the points are smoothed on the surface."""
+    moved = fit_axis(strip(wiggle=wiggle), 6)[0][4:-4]
+    assert np.abs(moved[:, 1]).max() < 0.1 * 0.3
+    assert np.abs(moved[:, 2]).max() < 0.02
+
+
+@pytest.mark.parametrize("thick", [0.15, 0.06, 0.025])
+def test_the_sides_say_where_the_middle_is_if_half_of_the_faces_belongs_to_another_bar(thick):
+    bar = strip(thick=thick)
+    own = (np.abs(bar.points[:, 1]) > 0.29) | (bar.points[:, 1] < 0)
+    half = path(bar.vertices, bar.points[own], bar.normals[own])
+    assert np.abs(fit_axis(half, 6)[0][4:-4, 1]).min() > 0.25 * 0.3  # in the middle of what is left
+    assert np.abs(fit_axis(half, 6, settle=True)[0][4:-4, 1]).max() < 0.1 * 0.3
+
+
+def middle(monkeypatch, skeleton):
+    """How firmly the sides say where the middle is, and how far away, at the vertices but those near the ends."""
+    said, ask = [], axis_fit._middle
+    monkeypatch.setattr(axis_fit, "_middle", lambda near: said.append(ask(near)) or said[-1])
+    fit_axis(skeleton, 1, settle=True)
+    return np.array(said[0])[:, 4:-4]
+
+
+def test_the_way_to_the_middle_is_half_the_difference_of_both_sides(monkeypatch):
+    bar = strip(thick=0.1)
+    bar = path(bar.vertices + [0, 0.05, 0], bar.points, bar.normals)
+    firm, way = middle(monkeypatch, bar)
+    np.testing.assert_allclose(np.abs(way / firm), 0.05, rtol=0.1)
+
+
+@pytest.mark.parametrize("case", ["tube", "step", "one side", "thinner than its noise"])
+def test_no_sides_no_middle(monkeypatch, case):
+    bar = strip()
+    flat, _ = middle(monkeypatch, bar)
+    if case == "tube":
+        given = tube()
+    elif case == "step":  # every other point is of a part that is a tenth as large
+        points = bar.points * np.where(np.arange(len(bar.points)) % 2, 1, 0.1)[:, None] ** [0, 1, 1]
+        given = path(bar.vertices, points, bar.normals)
+    elif case == "one side":
+        own = bar.points[:, 1] < 0.29
+        given = path(bar.vertices, bar.points[own], bar.normals[own])
+    else:
+        noise = np.random.default_rng(1).normal(0, [0, 0, 0.2], bar.points.shape)
+        given = path(bar.vertices, bar.points + noise, bar.normals)
+    assert middle(monkeypatch, given)[0].mean() < 0.2 * flat.mean()
+
+
+def test_a_hoop_bends_where_it_is_thin():
+    """A band .6 wide and .12 thick around a circle of radius .4: its width does not make the curve any smaller."""
+    bar, big, m = strip(wiggle=0), 0.4, 48
+    turn, out = np.pi / 2 * bar.points[:, 0], np.sqrt(big**2 + 2 * big * bar.points[:, 2])  # as dense inside as outside
+    away, rim = np.column_stack([np.cos(turn), np.sin(turn), 0 * turn]), np.arange(m) / m * 2 * np.pi
+    normals = bar.normals[:, 2:] * away + bar.normals[:, 1:2] * [0, 0, 1]
+    points = out[:, None] * away + bar.points[:, 1:2] * [0, 0, 1]
+    vertices = np.column_stack([0.42 * np.cos(rim), 0.42 * np.sin(rim), 0 * rim + 0.02])
+    moved = fit_axis(path(vertices, points, normals, closed=True), 6, settle=True)[0]
+    assert np.abs(np.hypot(moved[:, 0], moved[:, 1]) - big).max() < 0.25 * 0.06
+    assert np.abs(moved[:, 2]).max() < 0.1 * 0.3
+
+
+@pytest.mark.parametrize(("wide", "thick"), [(0.3, 0.06), (0.2, 0.1)])
+def test_the_section_of_a_flat_bar_is_its_own_and_its_width_is_doubt(wide, thick):
+    fitted = axis_fit.fit_axis(strip(wide, thick), 3)
+    sections = measure_sections(fitted)
+    np.testing.assert_allclose(sections.half_width[4:-4], wide, rtol=0.02)
+    np.testing.assert_allclose(sections.half_thickness[4:-4], thick, rtol=0.02)
+    # mean squares over the section, of what the normals do not explain and of the distance
+    face, side = wide / (wide + thick), thick / (wide + thick)
+    miss = (face * wide**2 + side * thick**2) / 3
+    apart = face * (wide**2 / 3 + thick**2) + side * (wide**2 + thick**2 / 3)
+    sure = 1 - min(2 * miss / apart, 1)
+    count = 6000 / 40 * 3  # the points of three vertices
+    assert fitted.confidence[4:-4].mean() == pytest.approx(sure * count / (count + HALF_SUPPORT), abs=0.02)
+    # the radius is that of the area, and up to a half more in places: a part of the width counts as noise
+    ratio = fitted.radii[4:-4] / np.sqrt(wide * thick)
+    assert ratio.min() > 0.95
+    assert 0.99 < ratio.mean() < 1.25
+    assert ratio.max() < 1.5
+
+
+# ---- noise as wide as the tube
+
+
+def noisy(noise, known):
+    """A tube along x whose points are `noise` radii off; normals in random directions unless they are known."""
+    rng = np.random.default_rng(0)
+    x, angle = rng.uniform(-1, 1, 3000), rng.uniform(0, 2 * np.pi, 3000)
+    normals = np.column_stack([0 * angle, np.cos(angle), np.sin(angle)])
+    points = R * (normals + noise * rng.normal(size=(3000, 3))) + x[:, None] * [1, 0, 0]
+    if not known:
+        normals = rng.normal(size=(3000, 3))
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    off = 0.1 * R * rng.normal(size=(60, 2))
+    return path(np.column_stack([np.linspace(-0.95, 0.95, 60), off]), points, normals)
+
+
+@pytest.mark.parametrize(("noise", "known"), [(0.3, False), (1.0, False), (1.0, True)])
+def test_where_noise_is_the_curve_is_smooth_and_near_the_axis(noise, known):
+    """The noise is up to a radius wide, and its normals may point anywhere."""
+    moved = fit_axis(noisy(noise, known=known), 3)[0]
+    assert off_axis(moved).mean() < 0.25 * R
+    # across the axis, not along it: it is as long as it was
+    assert np.ptp(moved[:, 0]) == pytest.approx(2 * 0.95, rel=0.05)
+
+
+@pytest.mark.parametrize("small", [0.1, 0.15])
+def test_bending_makes_a_ring_smaller_by_its_closed_form(monkeypatch, small):
+    """Per point, (w / h)^4 |x - chord|^2 = w^4 / (4 r^2) on a circle of radius r against 1/2 (r - big)^2 by normals."""
+    blurred = fit_axis(torus(small=small), 12)[0]
+    monkeypatch.setattr(axis_fit, "FIT_WIDEST", 0.1)
+    sharp = fit_axis(torus(small=small), 12)[0]
+    smaller = np.hypot(*sharp[:, :2].T).mean() - np.hypot(*blurred[:, :2].T).mean()
+    assert smaller == pytest.approx(small**4 / (2 * 0.4**3), rel=0.05)
+
+
+# ---- confidence
+
+
+@pytest.mark.parametrize("height", [0, 0.05, R, 0.4])
+def test_confidence_of_a_curve_off_the_axis(height):
+    """Doubt is h^2 / (h^2 + r^2) at the distance h from the axis: the share that the normals do not explain."""
+    near = 3 * 24 * 200 / 20  # the points of three vertices
+    inner = slice(2, -2)  # beyond the ends the way to the curve has a part along it
+    expected = R**2 / (R**2 + height**2) * near / (near + HALF_SUPPORT)
+    np.testing.assert_allclose(fit_axis(tube((0, height)), 0)[1][inner], expected, rtol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("case", "low", "high"),
+    [("bar", 0.7, 1), ("sheet", 0, 0.05), ("two sheets near each other", 0, 0.05), ("fog", 0, 0.4)],
+)
+def test_a_bar_has_two_sides_and_a_sheet_one(case, low, high):
+    """All points of its faces are as far from the curve as its half thickness; before it settles no fit is sure."""
+    bar = strip(thick=0.003 if "near" in case else 0.06)
+    if case == "sheet":
+        bar = path(bar.vertices, bar.points * [1, 1, 0], np.tile([0.0, 0, 1], (len(bar.points), 1)))
+    elif case == "fog":
+        normals = np.random.default_rng(1).normal(size=bar.normals.shape)
+        bar = path(bar.vertices, bar.points, normals / np.linalg.norm(normals, axis=1)[:, None])
+    sure = np.median(fit_axis(bar, 2, settle=True)[1])
+    assert low <= sure <= high
+    if case == "bar":
+        assert sure > 0.5 + np.median(fit_axis(bar, 2)[1])
+
+
+@pytest.mark.parametrize("aside", [[0, 0.2, 0], [0, 0, 0.1]])
+def test_a_curve_beside_the_middle_of_a_bar_is_less_sure(aside):
+    def doubt(skeleton):
+        x, ends, p, vertex = skeleton.vertices, skeleton.edges, skeleton.points, skeleton.vertex_of_point
+        onto = axis_fit.nearest_on_edges(x, ends, axis_fit.incident_edges(ends, len(x))[vertex], p)
+        near = axis_fit._nearest(x, ends, *onto, p, skeleton.normals, skeleton.radii, sides=True)
+        return np.median(axis_fit._flat_doubt(near, 0.0))
+
+    bar = strip()
+    moved = path(bar.vertices + aside, bar.points, bar.normals)
+    assert doubt(bar) < 0.1 < 0.4 < doubt(moved)
+
+
+def test_points_say_how_wide_a_section_is():
+    angle = (np.arange(200) + 0.5) * np.pi / 100
+    circle = R * np.column_stack([0 * angle, np.cos(angle), np.sin(angle)])
+    band = np.column_stack([np.zeros((400, 1)), np.linspace(-0.3, 0.3, 400), np.zeros(400)])
+    for points, wide in ((circle, R), (circle[:100], R), (band, 0.3)):
+        moments = (points[:, axis_fit.ROWS] * points[:, axis_fit.COLUMNS]).mean(axis=0)
+        np.testing.assert_allclose(axis_fit._spread_width(moments[None]), wide, rtol=0.01)
+
+
+def test_in_nothing_but_doubt_a_section_is_as_wide_as_the_square_of_its_points(monkeypatch):
+    """Half of its diagonal: what the moments of an edge count at both of its ends does not matter."""
+    found, nearest = [], axis_fit._nearest
+    monkeypatch.setattr(axis_fit, "_nearest", lambda *a, **k: found.append(nearest(*a, **k)) or found[-1])
+    given, inner = tube(), slice(3, -3)
+    fit_axis(path(given.vertices, given.points, np.cross([1, 0, 0], given.normals)), 0)
+    assert found[0].doubt[inner].min() > 0.99
+    np.testing.assert_allclose(found[0].width[inner], np.sqrt(2) * R, rtol=0.05)
+
+
+# ---- what does not matter, and what is not there
+
+
+@pytest.mark.parametrize(("scale", "shift"), [(1, [1e4, -3, 7]), (1e-9, 0), (1e12, 3e12)])
+def test_goes_with_the_cloud(scale, shift, placed):
+    moved, turn = placed(torus(), scale=scale, shift=shift)
+    (vertices, confidence, _), (expected, sure, _) = fit_axis(moved, 3), fit_axis(torus(), 3)
+    np.testing.assert_allclose((vertices - shift) / scale, expected @ turn, atol=1e-8)
+    np.testing.assert_allclose(confidence, sure, atol=1e-7)
+
+
+def test_points_without_a_normal_or_a_vertex_have_no_say():
+    raw, rest = torus(), slice(700, None)
+    normals, vertex, points = raw.normals.copy(), raw.vertex_of_point.copy(), raw.points.copy()
+    normals[:400], vertex[400:700] = np.nan, -1
+    points[:700] += np.random.default_rng(5).normal(size=(700, 3))
+    spoilt = replace(raw, points=points, normals=normals, vertex_of_point=vertex)
+    clean = replace(raw, points=points[rest], normals=normals[rest], vertex_of_point=vertex[rest])
+    for got, wanted in zip(fit_axis(spoilt, 3), fit_axis(clean, 3), strict=True):
+        np.testing.assert_allclose(got, wanted, atol=1e-12)
+    silent = replace(raw, normals=np.full_like(raw.normals, np.nan))
+    for nobody in (silent, replace(raw, points=(), normals=(), vertex_of_point=()), replace(raw, edges=())):
+        vertices, confidence, _ = fit_axis(nobody, 3)
+        np.testing.assert_array_equal(vertices, raw.vertices)
+        np.testing.assert_array_equal(confidence, 0)
+
+
+def test_vertices_between_points_bridge_them():
+    """Where the middle of a tube was not scanned, the curve is straight from one side to the other."""
+    raw = tube((0, 0.05), m=39)
+    seen = np.abs(raw.points[:, 0]) > 0.3
+    gap = replace(raw, points=raw.points[seen], normals=raw.normals[seen], vertex_of_point=raw.vertex_of_point[seen])
+    vertices, confidence, _ = fit_axis(gap, 6)
+    assert off_axis(vertices).max() < 0.02 * R
+    middle = np.abs(raw.vertices[:, 0]) < 0.2
+    assert (confidence[middle] == 0).all()
+    assert confidence[~middle].max() > 0.9
+
+
+# ---- vertices far from their points
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 10**6), st.integers(1, 8), st.booleans())
+def test_detached_vertices_are_pulled_back_to_the_reach_of_half_a_tube(random_skeleton, seed, m, every):
+    raw = random_skeleton(seed, m, n=40, every=every)
+    normals = raw.normals.copy()
+    normals[::7] = np.nan
+    raw = replace(raw, vertices=3 * raw.vertices, normals=normals)
+    skeleton = axis_fit.pull_back_detached(raw)
+    for v, (before, after) in enumerate(zip(raw.vertices, skeleton.vertices, strict=True)):
+        own = raw.points[[p for p in raw.supporting_points if raw.vertex_of_point[p] == v]]
+        if len(own) == 0:
+            np.testing.assert_array_equal(after, before)
+            continue
+        mean = own.mean(axis=0)
+        reach = axis_fit.HALF_TUBE_REACH * np.sqrt(((own - mean) ** 2).sum(axis=1).mean())
+        away = np.linalg.norm(before - mean)
+        np.testing.assert_allclose(after, mean + (before - mean) * min(1, reach / max(away, 1e-300)), atol=1e-12)
+
+
+# ---- radii
+
+
+def test_radii_of_a_cone_are_those_of_the_balls_in_it():
+    """The distance of its points is more.
+
+    Those of a vertex and of the vertices beside it are one section: at the ends it is that of places two edges away.
+    """
+    skeleton, slope = tube(), 0.1
+    normals = np.sqrt(1 - slope**2) * skeleton.normals - slope * np.array([1.0, 0, 0])
+    x = skeleton.points[:, :1]
+    cone = path(skeleton.vertices, x * [1, 0, 0] + (R + slope * x) * normals, normals)
+    radii = fit_axis(cone, 1)[2]
+    expected = R + slope * cone.vertices[:, 0]
+    np.testing.assert_allclose(radii, expected, atol=slope * 2 * 0.1)
+    share = (radii / expected)[4:-4]
+    np.testing.assert_allclose(share, 1, atol=0.01)  # rings of points are a tenth of an edge apart
+    assert share.mean() < 1.003

@@ -1,0 +1,198 @@
+"""Ends go on along their limbs and stop where these do."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from glsk_o3d import Skeleton, samples, skeletonize
+from glsk_o3d.curve.shape.ends import regrow_ends
+
+R = 0.1
+LENGTH = 1.2
+STEP = R / 3
+
+
+def turned(n, rng):
+    """Unit vectors around the x axis, (n, 3)."""
+    angle = rng.uniform(0, 2 * np.pi, n)
+    return np.column_stack([np.zeros(n), np.cos(angle), np.sin(angle)])
+
+
+def limb(cap, n=3000):
+    """A tube of radius R along x from 0 to LENGTH, and the cap that closes it there; normals have either sign."""
+    rng = np.random.default_rng(0)
+    normals = turned(n, rng)
+    points = R * normals + rng.uniform(0, LENGTH, (n, 1)) * [1, 0, 0]
+    density = n / (2 * np.pi * R * LENGTH)
+    if cap == "flat":
+        out = turned(round(density * np.pi * R**2), rng)
+        disc = [LENGTH, 0, 0] + R * np.sqrt(rng.uniform(size=(len(out), 1))) * out
+        points, normals = np.concatenate([points, disc]), np.concatenate([normals, np.tile([1, 0, 0], (len(out), 1))])
+    if cap == "round":
+        out = turned(round(density * 2 * np.pi * R**2), rng)
+        height = rng.uniform(size=(len(out), 1))
+        out = height * [1, 0, 0] + np.sqrt(1 - height**2) * out
+        points, normals = np.concatenate([points, [LENGTH, 0, 0] + R * out]), np.concatenate([normals, out])
+    return points, normals * rng.choice([-1, 1], (len(points), 1))
+
+
+def fork(points, normals, stop, hook=0.0):
+    """A path along x from 0 to `stop` that turns aside over the last radius; at 0 it meets two bare ones."""
+    x = np.linspace(0, stop, round(stop / STEP) + 1)
+    path = np.column_stack([x, hook * np.maximum(x - stop + R, 0), 0 * x])
+    m = len(path)
+    edges = [[0, m], [0, m + 1], *([i, i + 1] for i in range(m - 1))]
+    owner = cKDTree(path).query(points)[1]
+    vertices = np.concatenate([path, [[0, 5, 0], [0, -5, 0]]])
+    return Skeleton(vertices, sorted(edges), np.full(m + 2, R), owner, points, normals)
+
+
+def tip(skeleton):
+    """The end of the path along x."""
+    return skeleton.vertices[skeleton.leaves][np.argmax(skeleton.vertices[skeleton.leaves, 0])]
+
+
+@pytest.mark.parametrize("hook", [0, 1])
+@pytest.mark.parametrize("stop", [LENGTH, LENGTH - 3 * R])
+@pytest.mark.parametrize(("cap", "where"), [("flat", -0.5), ("open", -0.5), ("round", 0)])
+def test_an_end_stops_where_its_limb_does(refine, cap, where, stop, hook):
+    """Wherever contraction left it: half a radius inside a face, and at the centre of a round cap."""
+    found = tip(refine(fork(*limb(cap), stop, hook), recentre=3))
+    np.testing.assert_allclose(found, [LENGTH + where * R, 0, 0], atol=0.15 * R)
+
+
+@pytest.mark.parametrize("beside", [0, 8])
+def test_an_end_bent_into_a_corner_where_others_have_the_points_is_straightened(beside):
+    """The last radius of the curve turns aside, and owns next to nothing: only what is behind it knows of the limb."""
+    points, normals = limb("flat")
+    straight, k = fork(points, normals, LENGTH - R / 2), 12
+    m, end = len(straight.vertices), len(straight.vertices) - 3
+    aside = np.linspace(0, R, k + 1)[1:, None] * [0.2, 1, 0] + straight.vertices[end]
+    edges = [*straight.edges.tolist(), [end, m], *([i, i + 1] for i in range(m, m + k - 1))]
+    owner = straight.vertex_of_point.copy()
+    owner[np.argsort(np.linalg.norm(points - aside[-1], axis=1))[:beside]] = m + k - 1
+    radii = np.where(np.arange(m + k) < m, R, R / 20)
+    bent = Skeleton(np.concatenate([straight.vertices, aside]), sorted(edges), radii, owner, points, normals)
+    grown = regrow_ends(bent)
+    np.testing.assert_allclose(tip(grown), [LENGTH - R / 2, 0, 0], atol=0.2 * R)
+    limbs = grown.vertices[np.abs(grown.vertices[:, 1]) < 1]
+    assert np.abs(limbs[:, 1:]).max() < 0.2 * R
+
+
+def test_a_wire_on_a_thick_hub_keeps_its_bend():
+    """Points of the hub, which its first vertex owns, do not say that the wire has hardly any."""
+    rng, thin, turn = np.random.default_rng(0), R / 20, np.linspace(0, 3, 60)
+    hub = rng.normal(size=(8000, 3))
+    hub *= R / np.linalg.norm(hub, axis=1, keepdims=True)
+    axis = R * np.column_stack([np.sin(turn), 1 - np.cos(turn), 0 * turn])
+    place, angle = rng.uniform(1, 58, 150).astype(int), rng.uniform(0, 2 * np.pi, (150, 1))
+    side = np.column_stack([-np.sin(turn), np.cos(turn), 0 * turn])[place]
+    out = np.cos(angle) * side + np.sin(angle) * [0, 0, 1]
+    vertices = np.concatenate([axis, [[0, 0, 5], [0, 0, -5]]])
+    edges = [[0, 60], [0, 61], *([i, i + 1] for i in range(59))]
+    owner = np.concatenate([np.zeros(8000, int), place])
+    points, radii = np.concatenate([hub, axis[place] + thin * out]), np.full(62, thin)
+    grown = regrow_ends(Skeleton(vertices, sorted(edges), radii, owner, points, np.concatenate([hub / R, out])))
+    assert cKDTree(axis).query(grown.vertices[np.abs(grown.vertices[:, 2]) < 1])[0].max() < 2 * thin
+
+
+def test_the_end_of_a_long_bent_limb_is_not_cut_by_its_length():
+    """A fiftieth of the points of a spring are eight of its radii: they stay as they are, but for the cap."""
+    turn = np.linspace(0, 10 * np.pi, 40_000)
+    axis = np.column_stack([np.cos(turn), np.sin(turn), turn / 20])
+    rng, way = np.random.default_rng(0), np.gradient(axis, axis=0)
+    place = rng.integers(0, len(axis), 8000)
+    out = np.cross(way[place], rng.normal(size=(8000, 3)))
+    points = axis[place] + 0.08 * out / np.linalg.norm(out, axis=1, keepdims=True)
+    found = skeletonize(points)
+    assert cKDTree(axis).query(found.vertices)[0].max() < 0.4 * 0.08
+    assert cKDTree(found.vertices).query(axis[[0, -1]])[0].max() < 0.08
+
+
+def bottle(thin, long, n=6000):
+    """A tube of radius R with a neck of that radius and length, and faces at its shoulder and at the end."""
+    rng = np.random.default_rng(0)
+    out, area = turned(n, rng), np.array([R * LENGTH, thin * long, R**2 / 2])
+    part, u = rng.choice(3, (n, 1), p=area / area.sum()), rng.uniform(size=(n, 1))
+    disc = R * np.sqrt(u)
+    radius = np.choose(part, [R, thin, disc])
+    x = np.choose(part, [LENGTH * u, LENGTH + long * u, LENGTH + long * (disc < thin)])
+    normals = np.where(part == 2, [1, 0, 0], out)
+    return radius * out + x * [1, 0, 0], normals * rng.choice([-1, 1], (n, 1))
+
+
+@pytest.mark.parametrize("stop", [-1, 0, 1])
+@pytest.mark.parametrize(("thin", "long"), [(0.3, 1), (0.3, 2), (0.4, 1), (0.4, 1.5)])
+def test_a_neck_goes_on_beyond_its_shoulder(refine, thin, long, stop):
+    """Even one no longer than its limb is thick: the curve ends half its radius inside its face, and as thin as it."""
+    found = refine(fork(*bottle(thin * R, long * R), LENGTH + stop * R), recentre=3)
+    end = np.flatnonzero((found.vertices == tip(found)).all(axis=1))
+    np.testing.assert_allclose(tip(found), [LENGTH + (long - thin / 2) * R, 0, 0], atol=0.1 * R)
+    np.testing.assert_allclose(found.radii[end], thin * R, rtol=0.1)
+
+
+@pytest.mark.parametrize("cap", ["flat", "round"])
+def test_half_a_limb_is_enough(refine, cap):
+    """Seen from one side."""
+    points, normals = limb(cap)
+    seen = points[:, 1] > 0
+    found = tip(refine(fork(points[seen], normals[seen], LENGTH, 1), recentre=3))
+    np.testing.assert_allclose(found, [LENGTH - (cap == "flat") * R / 2, 0, 0], atol=0.2 * R)
+
+
+def test_new_vertices_are_like_those_behind(refine):
+    """As far apart and as thick; every point of a vertex that was cut has the nearest one of the end."""
+    found = refine(fork(*limb("flat"), LENGTH, 1), recentre=3)
+    along = np.sort(found.vertices[np.abs(found.vertices[:, 1]) < R, 0])
+    np.testing.assert_allclose(np.diff(along), STEP, rtol=0.25)
+    np.testing.assert_allclose(found.radii[1 : len(along) - 2], R, rtol=0.05)
+    assert (found.n_components, len(found.leaves)) == (1, 3)
+    apart = np.linalg.norm(found.points - found.vertices[found.vertex_of_point], axis=1)
+    assert apart.max() < 1.5 * R
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("n", "seed"), [(4096, 1), (8192, 0)])
+def test_a_head_that_hangs_from_its_neck_has_an_axis(n, seed):
+    """Three radii long, turned by 70 degrees: an end that goes on along the neck leaves through its skin."""
+    body = samples.sauropod(n, seed=seed)
+    skeleton = skeletonize(body.points)
+    nose = body.nodes[np.argmax(body.nodes[:, 0])]
+    away = np.linalg.norm(skeleton.vertices[skeleton.leaves] - nose, axis=1)
+    assert away.min() < 0.035  # .75 radii there
+
+
+def test_the_radii_of_wide_ends_are_their_own():
+    """Two balls on a bar: the run behind their outer halves is the bar's."""
+    rng = np.random.default_rng(0)
+    ball, turn = rng.standard_normal((5000, 3)), rng.uniform(0, 2 * np.pi, 1500)
+    ball *= 0.3 / np.linalg.norm(ball, axis=1, keepdims=True)
+    ball[:, 0] += np.where(np.arange(5000) % 2, 0.9, -0.9)
+    bar = np.column_stack([rng.uniform(-0.62, 0.62, 1500), 0.1 * np.cos(turn), 0.1 * np.sin(turn)])
+    outside = (np.hypot(ball[:, 1], ball[:, 2]) > 0.1) | (np.abs(ball[:, 0]) > 0.9)
+    found = skeletonize(np.concatenate([ball[outside], bar]))
+    x = np.abs(found.vertices[:, 0])
+    true = np.where(x > 0.62, np.sqrt(np.maximum(0.09 - (x - 0.9) ** 2, 0.01)), 0.1)
+    assert x.max() > 1
+    assert np.abs(found.radii - true)[x > 0.75].mean() < 0.04  # .1 with the run's
+
+
+@pytest.mark.parametrize(("reach", "stays"), [(0.8, True), (0.3, False)])
+def test_an_end_that_does_not_leave_its_body_stays(reach, stays):
+    """The run behind it lies in the body, of which the junction's points are the surface, and leads nowhere."""
+    points, normals = limb("round")
+    out = points[:, 0] > 0.3
+    skeleton = fork(points[out], normals[out], 0.6, hook=R)
+    body = np.random.default_rng(0).normal(size=(200, 3))
+    body *= reach / np.linalg.norm(body, axis=1, keepdims=True)
+    owner = np.concatenate([skeleton.vertex_of_point, np.zeros(len(body), int)])
+    with_body = replace(
+        skeleton,
+        points=np.concatenate([skeleton.points, body]),
+        normals=np.concatenate([skeleton.normals, body / reach]),
+        vertex_of_point=owner,
+    )
+    grown = regrow_ends(with_body)
+    assert np.array_equal(grown.vertices, with_body.vertices) == stays

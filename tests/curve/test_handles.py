@@ -1,0 +1,224 @@
+"""Handles: their curves keep to their axes up to the wall of the body, and go straight on to its middle."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from glsk_o3d import refiner, skeletonize
+from glsk_o3d.curve.shape.handles import Handles
+from glsk_o3d.curve.topology.limbs import Limbs
+from glsk_o3d.samples.capsules import union_sample
+
+BODY, HANDLE, REACH = 0.4, 0.06, 0.28
+TURN = np.linspace(-np.pi / 2, np.pi / 2, 17)
+
+
+def bow(side=1):
+    """The axis of a handle, from one place to another inside a body along z."""
+    return np.column_stack([side * (0.38 + REACH * np.cos(TURN)), 0 * TURN, REACH * np.sin(TURN)])
+
+
+def joined(*parts, n=4096, seed=0):
+    """Points of parts, each an axis and a radius."""
+    nodes, edges, radii = [], [], []
+    for axis, radius in parts:
+        k = sum(map(len, nodes)) + np.arange(len(axis))
+        nodes.append(axis)
+        edges.append(np.column_stack([k[:-1], k[1:]]))
+        radii.append(np.full(len(k), radius))
+    made = (np.concatenate(each) for each in (nodes, edges, radii))
+    return union_sample("parts", *made, n, 0.0, seed).points
+
+
+def pot(sides, seed=0):
+    """Points of a body with handles on some sides, and no other ends."""
+    body = np.array([[0, 0, -0.35], [0, 0, 0.35]])
+    return joined((body, BODY), *((bow(side), HANDLE) for side in sides), seed=seed)
+
+
+def curve_of(skeleton):
+    """Places all along the edges."""
+    a, b = skeleton.vertices[skeleton.edges].transpose(1, 0, 2)
+    share = np.linspace(0, 1, 40)[:, None, None]
+    return ((1 - share) * a + share * b).reshape(-1, 3)
+
+
+def off_axis(skeleton, side):
+    """Distance of places on a handle's axis outside of the body from the skeleton, in radii."""
+    axis = bow(side)
+    axis = axis[np.abs(axis[:, 0]) > BODY + HANDLE]
+    return cKDTree(curve_of(skeleton)).query(axis)[0] / HANDLE
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+@pytest.mark.parametrize("sides", [(1,), (1, -1)])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_handles_keep_to_their_axes_up_to_the_wall(sides, seed):
+    skeleton = skeletonize(pot(sides, seed=seed), limb=0.95)  # the body, as thick as it is long, has no ends then
+    assert (skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)) == (1, len(sides), 0)
+    assert max(off_axis(skeleton, side).max() for side in sides) < 0.5
+    assert skeleton.edge_lengths.min() > 0.05 * HANDLE  # no vertex is where another one is
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+def test_a_handle_goes_through_the_middle_of_its_body():
+    """Without a junction there; the points of the body belong to it, and its radius is that of the body."""
+    skeleton = skeletonize(pot([1]), limb=0.95)
+    middle = np.linalg.norm(skeleton.vertices, axis=1).argmin()
+    assert np.linalg.norm(skeleton.vertices[middle]) < 0.2 * BODY
+    assert skeleton.degree[middle] == 2
+    assert 0.8 * BODY < skeleton.radii[middle] < 1.2 * BODY
+    of_body = skeleton.points[:, 0] < 0
+    inside = np.linalg.norm(skeleton.vertices[:, :2], axis=1) < BODY
+    assert inside[skeleton.vertex_of_point[of_body]].mean() > 0.99
+
+
+def cup(seed, lid):
+    """Points of a cylinder, without the top or with it, and half a torus that meets its wall at right angles."""
+    random = np.random.default_rng(seed)
+    turn, high = random.uniform(-np.pi, np.pi, 40000), random.uniform(-0.5, 0.5, 40000)
+    wall = np.column_stack([BODY * np.cos(turn), BODY * np.sin(turn), high])
+    flat = np.column_stack([random.uniform(-BODY, BODY, (40000, 2)), np.full(40000, -0.5)])
+    flat = flat[np.hypot(*flat[:, :2].T) < BODY][: int(40000 * BODY / 2)]
+    flats = [flat, -flat] if lid else [flat]
+    around, along = random.uniform(-np.pi, np.pi, 40000), random.uniform(-np.pi / 2, np.pi / 2, 40000)
+    out = 0.3 + HANDLE * np.cos(around)
+    handle = np.column_stack([0.38 + out * np.cos(along), HANDLE * np.sin(around), out * np.sin(along)])
+    handle = handle[random.uniform(0, 0.3 + HANDLE, 40000) < out][: int(40000 * 0.3 * np.pi * HANDLE / BODY)]
+    points = np.concatenate([wall, *flats, handle[np.hypot(*handle[:, :2].T) > BODY]])
+    return points[random.permutation(len(points))[:4096]]
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+@pytest.mark.parametrize("lid", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_the_curve_of_a_cup_leaves_its_body_in_the_handle_only(seed, lid):
+    skeleton = skeletonize(cup(seed, lid))
+    assert (skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)) == (1, 1, 0)
+    x, y, z = curve_of(skeleton).T
+    assert np.abs(z).max() < 0.5
+    outside = np.hypot(x, y) > BODY
+    off = np.hypot(np.hypot(x - 0.38, z) - 0.3, y)[outside] / HANDLE
+    assert off.max() < 0.8
+    assert off.mean() < 0.2
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+@pytest.mark.parametrize("seed", range(4))
+def test_a_bail_is_followed_until_it_meets_a_long_body(seed):
+    """The walls of a basket that lies are twice as far away as it is wide, and its bail leaves along them."""
+    body = np.array([[-0.3, 0, 0], [0.3, 0, 0]])
+    turn = np.linspace(0, np.pi, 25)
+    bail = np.column_stack([0.6 * np.cos(turn), 0 * turn, 0.2 + 0.8 * np.sin(turn)])
+    skeleton = skeletonize(joined((body, BODY), (bail, 0.05), seed=seed))
+    assert skeleton.n_loops == 1
+    curve = curve_of(skeleton)
+    from_body = np.linalg.norm(curve - np.clip(curve, body[0], body[1]), axis=1)
+    assert np.minimum(from_body / BODY, cKDTree(bail).query(curve)[0] / 0.08).max() < 1
+    assert skeleton.edge_lengths.min() > 0.05 * HANDLE
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+@pytest.mark.parametrize("apart", [1.1, 1.3])
+def test_a_body_has_its_own_middle_beside_a_larger_one(apart):
+    along = np.linspace(0, 1, 17)
+    ball = np.array([[0, 0, -0.01], [0, 0, 0.01]])
+    bows = [
+        np.column_stack([apart * along, side * np.sin(np.pi * along) ** 0.7, 0 * along]) for side in (0.75, 0, -0.75)
+    ]
+    points = joined((ball, 0.25), (ball + [apart, 0, 0], 0.6), *((bow, 0.05) for bow in bows), n=8000)
+    skeleton = skeletonize(points)
+    assert skeleton.n_loops == 2
+    assert np.linalg.norm(skeleton.vertices, axis=1).min() < 0.06
+
+
+def ring(radii, beads=(), seed=0):
+    """Points of a ring of radius 1, as thick as this at 64 places, with balls on it: pairs of an angle and a radius."""
+    turn = np.append(np.linspace(0, 2 * np.pi, 64, endpoint=False), [angle for angle, _ in beads])
+    nodes = np.column_stack([np.cos(turn), np.sin(turn), 0 * turn])
+    edges = np.column_stack([np.arange(64), np.roll(np.arange(64), -1)])
+    radii = np.append(np.broadcast_to(radii, 64), [radius for _, radius in beads])
+    return union_sample("ring", nodes, edges, radii, 4096, 0.0, seed).points
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+@pytest.mark.parametrize(("radius", "bodies"), [(0.1, 0), (0.4, 1)])
+def test_only_a_thick_body_has_handles(radius, bodies):
+    """A bead on a ring of thickness .06."""
+    skeleton = skeletonize(ring(0.06, [(0, radius)]))
+    assert skeleton.n_loops == 1
+    assert len(Handles(skeleton).bodies) == bodies
+    assert np.abs(np.linalg.norm(skeleton.vertices, axis=1) - 1).max() < 0.15
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_thick_ring_with_a_thin_clasp_is_no_body(seed):
+    """The middle of its points is in the hole."""
+    turn = np.abs(np.linspace(-np.pi, np.pi, 64, endpoint=False))
+    skeleton = skeletonize(ring(np.interp(turn, [0.4, 0.8, np.pi], [0.05, 0.22, 0.28]), seed=seed))
+    assert skeleton.n_loops == 1
+    assert not len(Handles(skeleton).bodies)
+    assert np.abs(np.linalg.norm(skeleton.vertices, axis=1) - 1).max() < 0.15
+
+
+def bead(monkeypatch):
+    """A skeleton of a ring with a bead, as the junctions are moved from, its middle, and the size of the ring in it."""
+    given = []
+    monkeypatch.setattr(refiner, "move_junctions", lambda skeleton: given.append(skeleton) or skeleton)
+    points = ring(0.06, [(0, 0.4)])
+    skeletonize(points)
+    (skeleton,) = given
+    (middle,) = Handles(skeleton).bodies
+    return skeleton, int(middle), np.ptp(points) / np.ptp(skeleton.points)
+
+
+def followed(skeleton, middle):
+    """The lines from the middle of a body."""
+    limbs, handles = Limbs(skeleton, np.array([middle])), Handles(skeleton)
+    paths = [limbs.paths[limb] for limb in limbs.at[middle]]
+    return [handles.follow(path, handles.body(paths)) for path in paths]
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+def test_handles_are_followed_to_the_wall_and_from_either_end(monkeypatch):
+    skeleton, middle, size = bead(monkeypatch)
+    lines = followed(skeleton, middle)
+    assert len(lines) == 2
+    assert sum(line.start for line in lines) < skeleton.edge_lengths.sum()
+    for line in lines:
+        inwards = [1, 0, 0] - line.lead[0] * size
+        assert abs(np.linalg.norm(inwards) - 0.4) < 0.09
+        assert line.way @ inwards > 0.9 * np.linalg.norm(inwards)
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+def test_a_handle_that_breaks_off_before_the_wall_is_not_followed(monkeypatch):
+    skeleton, middle, size = bead(monkeypatch)
+    away = np.linalg.norm(skeleton.points * size - [1, 0, 0], axis=1)
+    seen = np.where((away > 0.45) & (away < 0.9), -1, skeleton.vertex_of_point)
+    assert followed(replace(skeleton, vertex_of_point=seen), middle) == [None, None]
+
+
+def test_junctions_are_in_the_middle_of_balls():
+    """Of a frame of thin bars between balls, all of which are handles of these."""
+    corner = np.array(list(np.ndindex(2, 2, 2)), float)
+    edges = np.array([(i, j) for i in range(8) for j in range(i) if np.abs(corner[i] - corner[j]).sum() == 1])
+    nodes, radii = np.concatenate([corner, corner]), np.repeat([0.05, 0.2], 8)
+    skeleton = skeletonize(union_sample("frame", nodes, edges, radii, 8000, 0.0, 0).points)
+    assert (len(skeleton.junctions), skeleton.n_loops) == (8, 5)
+    assert cKDTree(corner).query(skeleton.vertices[skeleton.junctions])[0].max() < 0.06
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+def test_a_handle_keeps_to_its_axis_whatever_is_said_of_its_direction_in_the_wall(monkeypatch):
+    follow = Handles.follow
+
+    def turned(self, path, body):
+        line = follow(self, path, body)
+        return line and line._replace(way=-line.way)
+
+    monkeypatch.setattr(Handles, "follow", turned)
+    assert off_axis(skeletonize(pot([1])), 1).max() < 0.5

@@ -1,0 +1,428 @@
+"""Loops, limbs, branches that cross air, and gaps: what the surface says of them, in closed cases."""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+
+from glsk_o3d import Connector, Contractor, Report, pipelines, samples, skeletonize
+from glsk_o3d.curve import loops, spurs
+from glsk_o3d.curve.topology.evidence import LEAST_INSIDE, Evidence
+from glsk_o3d.curve.topology.loops import CLEAR_SIGHT, WIDE_OPEN, WIDEST_FIRST, loop_facts
+from glsk_o3d.geometry.cycles import minimum_cycle_basis
+from glsk_o3d.geometry.neighbourhoods import nearest_neighbours
+from glsk_o3d.geometry.winding import AREA_NEIGHBOURS
+from glsk_o3d.samples.capsules import union_sample
+
+X, Y, Z = np.eye(3)
+TUBE = [[(-1, 0, 0), (1, 0, 0)]]
+TORUS = [[(np.cos(t), np.sin(t), 0) for t in np.arange(25) * np.pi / 12]]
+FORK = [[(0, 0, 0), (0, 0, -1)], [(0, 0, 0), (0.7, 0, 0.7)], [(0, 0, 0), (-0.7, 0, 0.7)]]
+LADDER = [[(-0.8, y, 0), (0, y, 0), (0.8, y, 0)] for y in (0, 0.5)] + [[(x, 0, 0), (x, 0.5, 0)] for x in (-0.8, 0, 0.8)]
+ACROSS = [[(-1, y, 0), (0, y, 0), (1, y, 0)] for y in (0, 0.5)] + [[(0, 0, 0), (0, 0.5, 0)]]
+"""Two parallel tubes, and an edge from one to the other."""
+SIDES = pytest.mark.parametrize("side", [None, Z + 0.3 * Y], ids=["whole", "one side"])
+
+
+def counts(skeleton):
+    return skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)
+
+
+def assert_unchanged(skeleton, raw):
+    np.testing.assert_allclose(skeleton.vertices, raw.vertices, atol=1e-12)
+    np.testing.assert_array_equal(skeleton.edges, raw.edges)
+    np.testing.assert_array_equal(skeleton.vertex_of_point, raw.vertex_of_point)
+
+
+def evidence_of(points, normals):
+    _, neighbours = nearest_neighbours(points, AREA_NEIGHBOURS + 1)
+    return Evidence(np.arange(len(points)), points, neighbours, normals)
+
+
+# ---- loops
+
+
+@SIDES
+@pytest.mark.parametrize(("lines", "loops"), [(LADDER, 2), (TORUS, 1)], ids=["ladder", "torus"])
+def test_handles_stay(piped, refine, lines, loops, side):
+    raw = piped(lines, side=side)
+    skeleton = refine(raw, handle=0.5)
+    assert_unchanged(skeleton, raw)
+    assert [(it.about, it.changed) for it in skeleton.report.decisions] == loops * [("loop", False)]
+    assert min(it.probability for it in skeleton.report.decisions) > 0.9
+
+
+def strands(piped, gap, length, **options):
+    """A tube with two strands in it that meet at both ends."""
+    a, b = length / 2, length / 2 - 0.05
+    middle = [[(-a, 0, 0), (-b, y, 0), (b, y, 0), (a, 0, 0)] for y in (-gap / 2, gap / 2)]
+    return piped([*middle, [(-1, 0, 0), (-a, 0, 0)], [(a, 0, 0), (1, 0, 0)]], around=TUBE, **options)
+
+
+def facts_of_the_loop(ring):
+    cycles = minimum_cycle_basis(len(ring.vertices), ring.edges, ring.edge_lengths)
+    (loop,) = loop_facts(ring, cycles, Evidence.of(ring))
+    return loop.facts
+
+
+def passage_of(ring):
+    return np.exp(facts_of_the_loop(ring)["passage"]) - 0.3
+
+
+@pytest.mark.parametrize("lines", [TORUS, LADDER], ids=["torus", "ladder"])
+def test_the_widest_sights_are_enough_to_find_the_passage(piped, monkeypatch, lines):
+    """Other places are only asked about if they could be better."""
+    ring, asked, winding = piped(lines), list[int](), Evidence.winding
+    monkeypatch.setattr(Evidence, "winding", lambda self, places: asked.append(len(places)) or winding(self, places))
+    cycles, found = minimum_cycle_basis(len(ring.vertices), ring.edges, ring.edge_lengths), []
+    for first in (1, WIDEST_FIRST, 10**6):
+        monkeypatch.setattr(loops, "WIDEST_FIRST", first)
+        asked.clear()
+        facts = [loop.facts for loop in loop_facts(ring, cycles, Evidence.of(ring))]
+        found.append((facts, sum(asked)))
+    (one, _), (some, few), (every, all_places) = found
+    assert one == some == every
+    assert few < 0.7 * all_places
+
+
+@pytest.mark.parametrize(("height", "clear"), [(None, True), (0.6, False), (1.5, True)])
+def test_one_sees_through_a_loop_if_no_surface_is_as_near_as_it_is_wide(piped, height, clear):
+    ring = piped(TORUS)
+    if height is not None:  # a sheet across it
+        x, y = np.mgrid[-1:1:41j, -1:1:41j]
+        sheet = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, height)])
+        points, normals = np.vstack([ring.points, sheet]), np.vstack([ring.normals, np.tile(Z, (len(sheet), 1))])
+        owner = np.concatenate([ring.vertex_of_point, np.zeros(len(sheet), int)])
+        ring = replace(ring, points=points, normals=normals, vertex_of_point=owner)
+    assert (passage_of(ring) > 0.9 * CLEAR_SIGHT) if clear else (passage_of(ring) < 0.5)
+
+
+def test_a_hole_in_the_data_has_no_walls(piped):
+    """The points around a torus's hole face it, those around a hole in a sheet are seen from the edge."""
+    ring = piped(TORUS)
+    assert passage_of(ring) > 0.9 * CLEAR_SIGHT
+    assert passage_of(replace(ring, normals=np.tile(Z, (len(ring.points), 1)))) < 0.01
+
+
+def test_directions_without_points_have_no_walls(piped):
+    ring = piped(TORUS)
+    half = ring.points[:, 0] > -0.2
+    seen = replace(
+        ring, points=ring.points[half], normals=ring.normals[half], vertex_of_point=ring.vertex_of_point[half]
+    )
+    assert passage_of(seen) < 0.5 * CLEAR_SIGHT
+
+
+def test_the_wall_is_what_one_sees_first(piped):
+    """Behind it may be what is not seen: a wall around a ring, with upright normals."""
+    ring = piped(TORUS)
+    turn, z = (each.ravel() for each in np.mgrid[0 : 2 * np.pi : 200j, -0.1:0.1:8j])
+    behind = np.column_stack([1.5 * np.cos(turn), 1.5 * np.sin(turn), z])
+    points, normals = np.vstack([ring.points, behind]), np.vstack([ring.normals, np.tile(Z, (len(behind), 1))])
+    owner = np.append(ring.vertex_of_point, np.zeros(len(behind), int))
+    assert passage_of(replace(ring, points=points, normals=normals, vertex_of_point=owner)) > 0.9 * CLEAR_SIGHT
+
+
+def test_there_is_no_passage_inside_of_a_part(piped):
+    assert passage_of(strands(piped, 0.12, 1.5)) < 0.3
+
+
+def test_an_opening_of_so_many_spacings_is_wide_enough(piped):
+    assert facts_of_the_loop(piped(TORUS))["opening"] == pytest.approx(np.log(WIDE_OPEN + 0.5))
+
+
+@pytest.mark.parametrize("n", [1024, 4096])
+def test_sparse_bars_keep_their_loops(n):
+    corner = np.array(list(np.ndindex(2, 2, 2)), float)
+    bars = np.array([(i, j) for i in range(8) for j in range(i) if np.abs(corner[i] - corner[j]).sum() == 1])
+    for seed in range(3):
+        frame = union_sample("frame", corner, bars, np.full(8, 0.12), n, 0.0, seed)
+        assert skeletonize(frame.points).n_loops == 5
+
+
+def test_a_passage_is_found_beside_the_wall_of_a_pot(piped):
+    """The loop goes through the pot's middle, so that the wall crosses the largest circle in it."""
+    angle = np.linspace(-np.pi / 2, np.pi / 2, 9)
+    handle = np.column_stack([0.9 + 0.5 * np.cos(angle), 0.5 * np.sin(angle), 0 * angle])
+    loop = [[(0, -0.5, 0), *handle.tolist(), (0, 0.5, 0)], [(0, 0.5, 0), (0, -0.5, 0)]]
+    pot = piped(loop, around=[handle.tolist()])
+    y, turn = (each.ravel() for each in np.mgrid[-1:1:60j, 0 : 2 * np.pi : 120j])
+    out = np.column_stack([np.cos(turn), 0 * y, np.sin(turn)])
+    wall, middle = 0.9 * out + np.outer(y, Y), np.flatnonzero(np.abs(pot.vertices[:, 0]) < 0.01)
+    owner = middle[np.abs(y[:, None] - pot.vertices[middle, 1]).argmin(axis=1)]
+    points, normals = np.vstack([pot.points, wall]), np.vstack([pot.normals, out])
+    pot = replace(pot, points=points, normals=normals, vertex_of_point=np.append(pot.vertex_of_point, owner))
+    assert passage_of(pot) > 0.5 * CLEAR_SIGHT
+
+
+@pytest.mark.parametrize("inside", [1, 0.35, 0.25, 0.1, -0.2])
+def test_a_loop_is_as_probable_as_it_has_an_inside(piped, monkeypatch, inside):
+    """A ring as thin as its points are apart has little, and a loop in air none, whatever else speaks for it."""
+    ring, full = piped(TORUS), Evidence.winding
+    cycles = minimum_cycle_basis(len(ring.vertices), ring.edges, ring.edge_lengths)
+    monkeypatch.setattr(Evidence, "winding", lambda self, places: inside * full(self, places))
+    (loop,) = loop_facts(ring, cycles, Evidence.of(ring))
+    assert loop.probability == pytest.approx(np.clip(2 * inside / LEAST_INSIDE - 1, 0, 1), abs=0.05)
+
+
+@SIDES
+@pytest.mark.parametrize("gap", [0.06, 0.12, 0.16])
+def test_two_strands_in_one_tube_become_a_path(piped, refine, gap, side):
+    raw = strands(piped, gap, 1.5, side=side)
+    skeleton = refine(raw, handle=0.5)
+    assert (raw.n_loops, counts(skeleton), len(skeleton.junctions)) == (1, (1, 0, 2), 0)
+    assert np.abs(skeleton.vertices[:, 1]).max() < 0.4 * gap
+    assert skeleton.report.n_loops_closed == 1
+    assert refine(raw).n_loops == 1
+
+
+def test_a_wide_loop_is_cut_where_nothing_hangs_together(piped, refine):
+    """A ring of which an eighth is in air, joined by hand; whatever is asked of a handle, it is none."""
+    raw = piped([[(np.cos(t), np.sin(t), 0) for t in np.arange(4, 29) * np.pi / 16]])
+    ends = np.sort(np.argsort(raw.vertices @ X)[-2:])
+    closed = replace(raw, edges=np.unique([*raw.edges.tolist(), ends.tolist()], axis=0))
+    skeleton = refine(closed, handle=1.0)
+    assert (closed.n_loops, counts(skeleton)) == (1, (1, 0, 2))
+    assert skeleton.report.n_loops_closed == 1
+    np.testing.assert_allclose(skeleton.vertices[skeleton.leaves], raw.vertices[raw.leaves], atol=1e-12)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:uncertain topology")  # one of a hundred questions may be a close call
+def test_an_object_of_many_parts_keeps_them():
+    """What is enough for a figure leaves a ladder's rungs a few points each, and no inside."""
+    rungs = 28
+    height = 0.3 * np.arange(rungs)
+    nodes = np.concatenate([np.column_stack([np.full(rungs, x), np.zeros(rungs), height]) for x in (0, 0.4)])
+    up = np.column_stack([np.arange(rungs - 1), np.arange(1, rungs)])
+    edges = np.concatenate([up, up + rungs, np.column_stack([np.arange(rungs), rungs + np.arange(rungs)])])
+    ladder = union_sample("ladder", nodes, edges, np.full(2 * rungs, 0.025), 50000, 0, 0)
+    assert counts(skeletonize(ladder.points)) == (1, rungs - 1, 0)
+
+
+# ---- limbs
+
+
+@pytest.mark.parametrize("turn", [np.eye(3), np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]])
+def test_the_object_is_beside_a_strand_and_nothing_beside_a_limb(turn):
+    x, y = (grid.ravel() for grid in np.mgrid[-2:2:0.08, -1:1:0.08])
+    plate = np.concatenate([np.column_stack([x, y, np.full(len(x), z)]) for z in (-0.1, 0.1)])
+    out = np.repeat([-Z, Z], len(x), axis=0)
+    strand, width = np.array([[0, t, 0] for t in (0, 0.2, 0.8)]), np.tile([1.0, 0, 0], (3, 1))
+    flat = evidence_of(plate @ turn, out @ turn)
+    # it has no rim
+    assert spurs._beside(flat, strand @ turn, width @ turn, [np.arange(3)], np.array([0.3])) > 0.65
+    along, t = (grid.ravel() for grid in np.mgrid[-2:2:0.08, 0 : 2 * np.pi : 0.26])
+    tube = np.column_stack([along, 0.3 * np.cos(t), 0.3 * np.sin(t)])
+    out = np.column_stack([np.zeros(len(t)), np.cos(t), np.sin(t)])
+    limb, width = np.array([[0, 0, 0], [1.5, 0, 0.0]]), np.tile([0, 1.0, 0], (2, 1))
+    # vertices without points have a width along the limb, if need be
+    for wide in (width, np.tile([1.0, 0, 0], (2, 1))):
+        around = evidence_of(tube @ turn, out @ turn)
+        assert spurs._beside(around, limb @ turn, wide @ turn, [np.arange(2)], np.array([0.3])) < 0.05
+
+
+def test_limbs_do_not_depend_on_how_the_object_is_turned(refine, placed):
+    """Nor on the order of the points, of which some are taken to say how far a branch stands out."""
+    raw = (pipelines.rings() | Contractor() | Connector())(samples.sauropod(3000).points)
+    raw = replace(raw)  # without what the connector says of its points
+    turned, _ = placed(raw)
+    again = [refine(skeleton, limb=1e-9, recentre=1).report.decisions for skeleton in (raw, turned)]
+    assert len(again[0]) > 4
+    sure, also = (sorted(each.probability for each in decisions) for decisions in again)
+    np.testing.assert_allclose(sure, also, atol=1e-6)
+
+
+def test_a_stub_in_a_flat_end_says_as_little_whatever_is_beside_it(piped, monkeypatch):
+    """Prongs of the curve in the end of a tube stand out of nothing; the tube does, if nothing is beside it."""
+    prongs = [[(0.9, 0, 0), (0.9, y, 0)] for y in (0.08, -0.08)]
+    bar = piped([[(-1, 0, 0), (0.9, 0, 0)], *prongs], around=TUBE, step=0.04)
+    evidence, facts = Evidence.of(bar), []
+    for shared in (0, 1):
+        monkeypatch.setattr(spurs, "_beside", lambda *given, shared=shared: np.full(len(given[3]), shared))
+        facts.append([each["protrusion"] for _, each in sorted(spurs.limb_facts(bar, evidence))])
+    apart, within = np.array(facts)
+    stub = apart < 0
+    assert stub.tolist() == [False, True, True]
+    np.testing.assert_array_equal(within[stub], apart[stub])
+    np.testing.assert_allclose(within[~stub], 0, atol=1e-12)
+
+
+def test_a_long_limb_is_judged_by_what_is_outside_of_its_body():
+    path, half = np.arange(11)[::-1], np.full(11, 0.1)
+    vertices = np.arange(11)[::-1, None] / 10 * Z  # from the junction, vertex 10, a tenth each
+    np.testing.assert_array_equal(spurs._outside(vertices, path, 0.45, half), [5, 4, 3, 2, 1, 0])
+    np.testing.assert_array_equal(spurs._outside(vertices, path, 0.65, half), path[1:])  # not twice as long as wide
+    np.testing.assert_array_equal(spurs._outside(vertices, path, 1.5, half), path[1:])
+    np.testing.assert_array_equal(spurs._outside(vertices, path, 0.0, half), path[1:])
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_thin_spout_of_a_thick_body_is_a_limb(seed):
+    """Up to the surface the points around its curve are the body's, ten times as wide."""
+    nodes = np.array([[-0.7, 0, 0], [0.7, 0, 0], [0, 0, 0], [0.2, 0, 0.8]])
+    body = union_sample("", nodes, np.array([[0, 1], [2, 3]]), np.array([0.4, 0.4, 0.04, 0.04]), 4000, 0.0, seed)
+    skeleton = skeletonize(body.points)
+    assert counts(skeleton) == (1, 0, 3)
+    assert min(it.probability for it in skeleton.report.decisions if it.about == "limb") > 0.9
+
+
+def twig(piped, reach, around=None):
+    """A tube and an edge path from its middle, `reach` radii long."""
+    return piped([[(-1, 0, 0), (0, 0, 0), (1, 0, 0)], [(0, 0, 0), (0, 0.1 * reach, 0)]], around)
+
+
+def test_a_branch_is_a_limb_as_far_as_its_points_reach(piped, refine):
+    """However long its curve is."""
+    assert counts(refine(twig(piped, 5, TUBE), limb=0.25)) == (1, 0, 2)
+    found = []
+    for reach in (0.8, 1.5, 2, 3, 5):
+        skeleton = refine(twig(piped, reach), limb=1e-9)
+        assert len(skeleton.leaves) == 3
+        (tip,) = (it for it in skeleton.report.decisions if it.place[1] > 0)
+        assert (tip.about, tip.changed) == ("limb", False)
+        found.append(tip.probability)
+    assert (np.diff(found) > 0).all()
+    assert found[0] < 0.4 < 0.5 < found[1] < found[2] < 0.95 < found[3]
+    assert refine(twig(piped, 0.8)).report.decisions == ()  # 0 does not ask
+
+
+def test_a_spur_goes_whole_and_nothing_else(piped, refine):
+    raw, stays = twig(piped, 0.8), twig(piped, 3)
+    skeleton = refine(raw, limb=0.25)
+    left = raw.vertices[:, 1] == 0
+    np.testing.assert_allclose(skeleton.vertices, raw.vertices[left], atol=1e-12)
+    (place,) = np.flatnonzero((skeleton.vertices == 0).all(axis=1))
+    owner = raw.vertex_of_point
+    np.testing.assert_array_equal(skeleton.vertex_of_point[~left[owner]], place)  # the fork takes its points
+    places = skeleton.vertices[skeleton.vertex_of_point[left[owner]]]
+    np.testing.assert_allclose(places, raw.vertices[owner[left[owner]]], atol=1e-12)
+    (gone,) = skeleton.report.decisions
+    for least, leaves in ((gone.probability - 1e-9, 3), (gone.probability + 1e-9, 2)):
+        assert len(refine(raw, limb=least).leaves) == leaves
+    assert_unchanged(refine(stays, limb=0.25), stays)
+
+
+def test_what_ends_nowhere_is_no_spur(piped, refine):
+    """A tiny ring on a stem, two ways between two junctions, and a path shorter than it is thick."""
+    tiny = [(0, 0, 0.02), (0.01, 0, 0.03), (0, 0, 0.04), (-0.01, 0, 0.03), (0, 0, 0.02)]
+    ring = [[(-1, 0, 0), (0, 0, 0), (1, 0, 0)], [(0, 0, 0), (0, 0, 0.02)], tiny]
+    for raw in (piped(ring, TUBE), strands(piped, 0.04, 0.2), piped([[(0, 0, 0), (0.05, 0, 0)]])):
+        assert_unchanged(refine(raw, limb=0.25), raw)
+
+
+def test_of_a_fork_of_short_limbs_the_better_two_stay(piped, refine):
+    """They are one path."""
+    raw = piped([[(0, 0, 0), (0.1, 0, 0)], [(0, 0, 0), (-0.05, 0.12, 0)], [(0, 0, 0), (-0.05, -0.14, 0)]])
+    assert counts(refine(raw, limb=1.0)) == (1, 0, 2)
+
+
+def test_each_prong_of_a_fork_is_judged_for_itself(piped, refine):
+    alike = piped([[(0, 0, 0), (0, 0, -1)], [(0, 0, 0), (0.15, 0, 0.15)], [(0, 0, 0), (-0.15, 0, 0.15)]])
+    low, high = sorted(it.probability for it in refine(alike, limb=1e-9).report.decisions)[:2]
+    assert high - low < 0.1
+
+
+def test_a_stout_body_keeps_its_short_legs():
+    """Which leave it by one to two of their own diameters."""
+    body, middle = np.array([[-0.5, 0, 0], [0.5, 0, 0]]), np.array([[-0.35, 0, 0], [0.35, 0, 0]])
+    edges, right = np.array([[0, 1], [2, 4], [3, 5], [2, 6], [3, 7]]), []
+    for (reach, thick), seed in product([(0.25, 0.1), (0.4, 0.14), (0.6, 0.18)], range(4)):
+        feet = [middle + [0, side, thick - 0.35 - reach] for side in (-0.2, 0.2)]
+        nodes, radii = np.concatenate([body, middle, *feet]), np.repeat([0.35, thick], [2, 6])
+        cow = union_sample("", nodes, edges, radii, 4096, 0.0, seed)
+        right.append(counts(skeletonize(cow.points)) == (1, 0, 6))
+    assert sum(right) >= 11  # of 12
+
+
+# ---- branches that cross air
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.5])
+def test_an_edge_between_two_tubes_is_cut(piped, refine, noise):
+    raw = replace(piped(ACROSS, ACROSS[:2]), report=Report(noise=noise))
+    skeleton = refine(raw, air=0.5, limb=0.5)
+    assert (raw.n_components, counts(skeleton), skeleton.report.n_cuts) == (1, (2, 0, 4), 1)
+    (false,) = (it for it in skeleton.report.decisions if it.about == "air" and it.changed)
+    np.testing.assert_allclose(false.place, [0, 0.25, 0], atol=0.16)
+    # what stays lies in the tubes, and has all points
+    assert np.minimum(np.abs(skeleton.vertices[:, 1]), np.abs(skeleton.vertices[:, 1] - 0.5)).max() < 0.16
+    assert skeleton.vertex_of_point.min() >= 0
+    assert_unchanged(refine(raw, air=1.0), raw)
+
+
+@SIDES
+@pytest.mark.parametrize("lines", [ACROSS, FORK, TUBE, TORUS], ids=["strut", "fork", "tube", "ring"])
+def test_limbs_and_struts_are_kept(piped, refine, lines, side):
+    raw = piped(lines, side=None if lines is ACROSS else side)
+    skeleton = refine(raw, air=0.5)
+    assert_unchanged(skeleton, raw)
+    assert len(skeleton.report.decisions) == len(raw.branches)
+    assert max(it.probability for it in skeleton.report.decisions) < 0.25
+
+
+# ---- gaps
+
+ARC = [[(np.cos(t), np.sin(t), 0) for t in np.linspace(0.15, 2 * np.pi - 0.15, 30)]]
+PARTS = [[(-1, 0, 0), (-0.15, 0, 0)], [(0.15, 0, 0), (1, 0, 0)]]
+"""A tube of which a stretch of three radii was not seen."""
+
+
+def capped(skeleton, *caps, radius=0.1, spacing=0.03):
+    """Half balls of points more, each at a place, bulging along a direction."""
+    points, normals = [skeleton.points], [skeleton.normals]
+    for k, (place, way) in enumerate(caps):
+        out = np.random.default_rng(k).normal(size=(round(4 * np.pi * radius**2 / spacing**2), 3))
+        out /= np.linalg.norm(out, axis=1, keepdims=True)
+        out = out[out @ way > 0]
+        points.append(place + radius * out)
+        normals.append(out)
+    points, normals = np.concatenate(points), np.concatenate(normals)
+    owner = np.argmin(np.linalg.norm(points[:, None] - skeleton.vertices, axis=2), axis=1)
+    return replace(skeleton, points=points, normals=normals, vertex_of_point=owner)
+
+
+@SIDES
+@pytest.mark.parametrize(
+    ("lines", "after", "place"), [(ARC, (1, 1, 0), X), (PARTS, (1, 0, 2), 0 * X)], ids=["ring", "limb"]
+)
+def test_where_the_object_goes_on_a_gap_is_bridged(piped, refine, lines, after, place, side):
+    raw = piped(lines, side=side)
+    skeleton = refine(raw, bridge=0.5)
+    assert (counts(skeleton), skeleton.report.n_bridges) == (after, 1)
+    ((about, changed),) = [(it.about, it.changed) for it in skeleton.report.decisions]
+    assert (about, changed) == ("gap", True)
+    np.testing.assert_allclose(skeleton.report.decisions[0].place, place, atol=0.05)
+    assert len(skeleton.edges) == len(raw.edges) + 1
+    np.testing.assert_allclose(skeleton.vertices, raw.vertices, atol=1e-12)
+    assert refine(raw).n_components == raw.n_components
+
+
+def test_where_it_ends_it_is_not(piped, refine):
+    """Two capsules end to end, and a tip that points at the side of a tube."""
+    tip = piped([[(0.3, 0, 0), (1, 0, 0)], [(0, -1, 0), (0, 0, 0), (0, 1, 0)]])
+    for raw in (capped(piped(PARTS), (-0.15 * X, X), (0.15 * X, -X)), capped(tip, (0.3 * X, -X))):
+        skeleton = refine(raw, bridge=0.5)
+        assert_unchanged(skeleton, raw)
+        assert max((it.probability for it in skeleton.report.decisions), default=0) < 0.5
+
+
+def test_which_gaps_are_asked(piped, refine):
+    """Of what an end points at, is not near along the skeleton, and is not too far."""
+
+    def asked(*lines):
+        return len(refine(piped(lines), bridge=1.0).report.decisions)
+
+    assert asked([(-1, 0, 0), (-0.2, 0, 0)], [(0.2, 0, 0), (1, 0, 0)]) == 1
+    assert asked([(-1, 0, 0), (-0.6, 0, 0)], [(0.6, 0, 0), (1, 0, 0)]) == 0
+    assert asked([(-1, 0, 0), (0, 0, 0)], [(-1, 0.3, 0), (0, 0.3, 0)]) == 0  # side by side
+    assert asked([(-1, 0, 0), (0.1, 0, 0), (0.1, 0.25, 0), (0, 0.25, 0), (0, 0.15, 0)]) == 0  # a hook
+
+
+def test_every_end_is_joined_once(piped, refine):
+    """Three ends meet: the two in line are surer."""
+    skeleton = refine(piped([*PARTS, [(0, 0.3, 0), (0, 1, 0)]]), bridge=0.01)
+    assert skeleton.degree.max() <= 3
+    joined = [sorted(skeleton.vertices[e, 0].tolist()) for e in skeleton.edges if skeleton.edge_lengths.max() > 0.2]
+    assert [-0.15, 0.15] in joined

@@ -1,0 +1,110 @@
+"""Parts that are thin against the spacing of the points: wires, twigs of dense clouds, and what only looks so."""
+
+import numpy as np
+import pytest
+
+from glsk_o3d import pipelines, skeletonize
+from glsk_o3d.geometry.polylines import places_on_edges
+
+pytestmark = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+
+
+def tubes(nodes, edges, radius, n, seed=0):
+    """Random points on open tubes around straight edges."""
+    rng, nodes, edges = np.random.default_rng(seed), np.asarray(nodes, float), np.asarray(edges)
+    along = nodes[edges[:, 1]] - nodes[edges[:, 0]]
+    area = np.linalg.norm(along, axis=1) * radius
+    edge, t, turn = rng.choice(len(edges), n, p=area / area.sum()), rng.random(n), 2 * np.pi * rng.random(n)
+    across = np.cross(along[edge], [0.3, 0.5, 0.8])
+    across /= np.linalg.norm(across, axis=1)[:, None]
+    other = np.cross(along[edge], across)
+    other /= np.linalg.norm(other, axis=1)[:, None]
+    around = np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * other
+    return places_on_edges(nodes, edges, edge, t) + np.broadcast_to(radius, len(edges))[edge, None] * around
+
+
+def net(n):
+    """A square net of n x n knots."""
+    knots = np.array(list(np.ndindex(n, n, 1)), float)
+    return knots, np.array([(i, j) for i in range(n * n) for j in range(i) if np.abs(knots[i] - knots[j]).sum() == 1])
+
+
+def lattice(cells, rings):
+    """A cylindrical stent: zigzag rings that share their peaks."""
+    turn = np.pi * np.arange(2 * cells) / cells
+    level = np.arange(rings + 1)[:, None]
+    nodes = np.stack([3 * np.cos(turn) + 0 * level, 3 * np.sin(turn) + 0 * level, 2.0 * level + 0 * turn], axis=2)
+    row, column = np.meshgrid(np.arange(rings), np.arange(2 * cells), indexing="ij")
+    up = (row + column) % 2
+    nearby = (column + 1) % (2 * cells)
+    low, high = (row + up) * 2 * cells + column, (row + 1 - up) * 2 * cells + nearby
+    used, edges = np.unique(np.stack([low, high], axis=-1).reshape(-1, 2), return_inverse=True)
+    return nodes.reshape(-1, 3)[used], edges.reshape(-1, 2)
+
+
+@pytest.mark.parametrize(("frame", "radius"), [(net(5), 0.02), (lattice(5, 3), 0.06)], ids=["net", "stent"])
+@pytest.mark.parametrize("around", [4, 4.5])
+def test_frames_of_wires_keep_their_loops(frame, radius, around):
+    """Whose wires have too few points around them for a surface."""
+    nodes, edges = frame
+    length = np.linalg.norm(nodes[edges[:, 0]] - nodes[edges[:, 1]], axis=1).sum()
+    n = round(length * around**2 / (2 * np.pi * radius))
+    found = skeletonize(tubes(nodes, edges, radius, n))
+    assert (found.n_components, found.n_loops) == (1, len(edges) - len(nodes) + 1)
+    assert len(found.leaves) <= 1
+    assert found.length == pytest.approx(length, rel=0.05)
+    assert found.report.n_traced == 0
+
+
+def clumps(n, several, seed=0):
+    """A rod of points in clumps, as of multi-view stereo: as thick as it is wide, and 8 radii long."""
+    rng = np.random.default_rng(seed)
+    m = n // several
+    turn, out = 2 * np.pi * rng.random(m), np.sqrt(rng.random(m))
+    rod = np.column_stack([8 * rng.random(m), out * np.cos(turn), out * np.sin(turn)])
+    return rod[rng.integers(m, size=n)] + 0.3 * rng.gamma(1, size=(n, 1)) * rng.normal(size=(n, 3))
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("n", "several"), [(300, 3), (300, 4), (1000, 5)])
+def test_a_part_scattered_as_thick_as_it_is_wide_is_no_bundle_of_twigs(n, several, seed):
+    found = skeletonize(clumps(n, several, seed))
+    assert found.report.n_traced == 0
+    assert len(found.leaves) < 10
+
+
+def test_scattered_rings_have_one_loop_not_those_of_wires():
+    rng = np.random.default_rng(0)
+    (turn, side), out = 2 * np.pi * rng.random((2, 500)), np.sqrt(rng.random(500))
+    wide = 3.5 + 0.7 * out * np.cos(side)
+    ring = np.column_stack([wide * np.cos(turn), wide * np.sin(turn), 0.7 * out * np.sin(side)])
+    cloud = ring[rng.integers(500, size=1000)] + 0.2 * rng.gamma(1, size=(1000, 1)) * rng.normal(size=(1000, 3))
+    found = skeletonize(cloud)
+    assert (found.n_components, found.n_loops) == (1, 1)
+
+
+def arbor(seed):
+    """A long cable that ends in an arbor of twigs a fifth as thick, which fork six times."""
+    rng = np.random.default_rng(seed)
+    nodes, edges, ways = [np.zeros(3), np.array([0, 0, 60.0])], [(0, 1)], [(1, np.array([0, 0, 1.0]))]
+    for _ in range(6):
+        grown = []
+        for fork, way in ways:
+            for _ in range(2):
+                turn = way + 0.8 * rng.standard_normal(3)
+                turn /= np.linalg.norm(turn)
+                nodes.append(nodes[fork] + turn * rng.uniform(0.9, 1.6))
+                edges.append((fork, len(nodes) - 1))
+                grown.append((len(nodes) - 1, turn))
+        ways = grown
+    return np.array(nodes), np.array(edges), np.where(np.arange(len(edges)), 0.05, 0.25)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [60_000, 100_000, 300_000])
+def test_more_points_do_not_find_less_of_thin_parts(n):
+    """Whose length is that of few vertices one per cent of the diagonal apart."""
+    nodes, edges, radius = arbor(0)
+    found = pipelines.default()(tubes(nodes, edges, radius, n))
+    length = np.linalg.norm(nodes[edges[:, 0]] - nodes[edges[:, 1]], axis=1).sum()
+    assert found.length == pytest.approx(length, rel=0.1)

@@ -1,0 +1,172 @@
+"""Skeleton: the graph and what can be asked of it."""
+
+import dataclasses
+from itertools import pairwise
+
+import networkx as nx
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from glsk_o3d import InvalidParameterError, Skeleton
+from glsk_o3d.data.skeleton import NOT_MEASURED
+
+
+def skeleton_of(m, edges):
+    rng = np.random.default_rng(m)
+    edges = sorted({(min(edge), max(edge)) for edge in edges})
+    cloud = [0] * 4, rng.normal(size=(4, 3)), ()
+    return Skeleton(rng.normal(size=(m, 3)), edges, rng.random(m), *cloud, confidence=rng.random(m))
+
+
+def cycle(nodes):
+    return list(zip(nodes, [*nodes[1:], nodes[0]], strict=True))
+
+
+def path(nodes):
+    return list(pairwise(nodes))
+
+
+HAND_MADE = {
+    # vertices, edges; components, loops, leaves, junctions; vertices of the branches
+    "one vertex": (1, [], (1, 0, 0, 0), []),
+    "a path": (5, path([3, 1, 4, 0, 2]), (1, 0, 2, 0), [5]),
+    "a ring": (6, cycle([0, 3, 1, 5, 2, 4]), (1, 1, 0, 0), [7]),
+    "a ring on a stick": (7, cycle([0, 1, 2, 3]) + path([0, 4, 5, 6]), (1, 1, 1, 1), [4, 5]),
+    "an eight": (7, cycle([0, 1, 2, 3]) + cycle([0, 4, 5, 6]), (1, 2, 0, 1), [5, 5]),
+    "a theta": (6, [*cycle([0, 1, 2, 3, 4, 5]), (0, 3)], (1, 2, 0, 2), [2, 4, 4]),
+    "a forest": (9, [*path([0, 4, 8]), *cycle([1, 2, 3]), (5, 6)], (4, 1, 4, 0), [2, 3, 4]),
+}
+
+
+@pytest.mark.parametrize("which", HAND_MADE)
+def test_hand_made_graphs(which):
+    m, edges, counts, branches = HAND_MADE[which]
+    skeleton = skeleton_of(m, edges)
+    found = skeleton.n_components, skeleton.n_loops, len(skeleton.leaves), len(skeleton.junctions)
+    assert found == counts
+    assert sorted(map(len, skeleton.branches)) == branches
+    for count, name in zip(counts, ("components", "loops", "leaves", "junctions"), strict=True):
+        assert f"{count} {name}" in repr(skeleton)
+
+
+@pytest.mark.slow
+@settings(max_examples=150)
+@given(st.integers(1, 14), st.sets(st.tuples(st.integers(0, 13), st.integers(0, 13))))
+def test_random_graphs_against_networkx(m, edges):
+    edges = {(a, b) for a, b in edges if a < b < m}
+    skeleton = skeleton_of(m, edges)
+    graph = nx.Graph()
+    graph.add_nodes_from(range(m))
+    graph.add_edges_from(edges)
+    degree = [graph.degree[i] for i in range(m)]
+    assert skeleton.degree.tolist() == degree
+    assert skeleton.leaves.tolist() == [i for i in range(m) if degree[i] == 1]
+    assert skeleton.junctions.tolist() == [i for i in range(m) if degree[i] > 2]
+    assert skeleton.n_components == nx.number_connected_components(graph)
+    assert skeleton.n_loops == len(nx.cycle_basis(graph))
+    for part in nx.connected_components(graph):
+        assert len({skeleton.component_of_vertex[i] for i in part}) == 1
+
+    covered = []
+    for branch in skeleton.branches:
+        covered += [tuple(sorted(edge)) for edge in path(branch.tolist())]
+        assert all(degree[i] == 2 for i in branch[1:-1])
+        ends = {int(branch[0]), int(branch[-1])}
+        assert all(degree[i] != 2 for i in ends) or len(ends) == 1
+    assert sorted(covered) == sorted(edges)  # every edge in one branch, once
+
+    back = skeleton.to_networkx()
+    assert set(back.nodes) == set(range(m))
+    assert {tuple(sorted(edge)) for edge in back.edges} == edges
+    for i in range(m):
+        facts = dict(back.nodes[i])
+        assert np.isnan(facts.pop("support"))
+        assert facts == {
+            "position": tuple(skeleton.vertices[i]),
+            "radius": skeleton.radii[i],
+            "confidence": skeleton.confidence[i],
+            "half_width": skeleton.half_width[i],
+            "half_thickness": skeleton.half_thickness[i],
+        }
+    total = sum(length for _, _, length in back.edges(data="length"))
+    assert skeleton.length == pytest.approx(total)
+
+
+def test_arrays_are_of_the_promised_kind():
+    skeleton = Skeleton([[0, 0, 0], [3, 4, 0]], [(0, 1)], [1, 2], [0], [[0, 0, 0]], [[0, 0, 1]])
+    assert skeleton.vertices.dtype == skeleton.radii.dtype == skeleton.points.dtype == np.float64
+    assert skeleton.edges.dtype == skeleton.vertex_of_point.dtype == np.int64
+    assert (skeleton.length, skeleton.edge_lengths.tolist()) == (5, [5])
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        skeleton.edges = None
+    nothing = Skeleton([], [], [], [], [], [])
+    assert nothing.edges.shape == (0, 2)
+    assert (nothing.n_components, nothing.n_loops, nothing.length, nothing.branches) == (0, 0, 0, ())
+
+
+def test_confidence_and_half_axes_are_those_that_were_measured():
+    """Else no number, and the radius."""
+    plain = Skeleton([[0, 0, 0], [1, 0, 0]], [(0, 1)], [1, 2], [0], [[0, 0, 0]], [[0, 0, 1]])
+    assert np.isnan(plain.confidence).tolist() == [True, True]
+    assert plain.half_width.tolist() == plain.half_thickness.tolist() == [1, 2]
+    measured = dataclasses.replace(plain, confidence=[1, 0.5], half_width=[2, 4], half_thickness=[1, 1])
+    moved = dataclasses.replace(measured, vertices=measured.vertices + 1)
+    assert moved.confidence.tolist() == [1, 0.5]
+    assert (moved.half_width.tolist(), moved.half_thickness.tolist()) == ([2, 4], [1, 1])
+    assert moved.confidence.dtype == moved.half_width.dtype == np.float64
+    one = dataclasses.replace(measured, **NOT_MEASURED, vertices=[[0, 0, 0]], edges=[], radii=[3])
+    assert np.isnan(one.confidence).tolist() == [True]
+    assert one.half_width.tolist() == one.half_thickness.tolist() == [3]
+
+
+LINE = dict(
+    vertices=[[0.0, 0, 0], [1, 0, 0], [2, 0, 0]],
+    edges=[[0, 1], [1, 2]],
+    radii=[1.0, 1, 1],
+    vertex_of_point=[0, 2, -1],
+    points=[[0.0, 0, 1], [2, 0, 1], [np.nan] * 3],
+    normals=[[0, 0, 1.0]] * 3,
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("vertices", [[0.0, 0], [1, 0]], r"vertices: has shape \(2, 2\) and dtype float64: must be numbers, 3 a row"),
+        ("vertices", [[0, 0, 0], [1, 0]], "vertices: is no array: "),
+        ("vertices", [["0", "0", "0"]] * 3, "vertices: has shape .* and dtype <U1: must be numbers"),
+        ("vertices", [[0, 0, 0], [1, 0, np.nan], [2, 0, 0]], r"vertices\[1\] = \[1.0, 0.0, nan\]: must be finite"),
+        ("vertices", [[0, 0, 0], [1, 0, 0], [0, 0, 1e200]], r"vertices\[2\] = .*: must be finite, and at most 1e\+150"),
+        ("edges", [[0.5, 1]], r"edges: has shape \(1, 2\) and dtype float64: must be whole numbers, 2 a row"),
+        ("edges", [[0, 1], [1, 3]], r"edges\[1\] = \[1, 3\]: names a missing vertex: there are 3"),
+        ("edges", [[0, 1], [2, 2]], r"edges\[1\] = \[2, 2\]: joins a vertex with itself"),
+        ("edges", [[0, 1], [1, 2], [1, 0]], r"edges\[0\] = \[0, 1\]: is there twice"),
+        ("radii", [1, 1], "radii: has 2 rows for 3 vertices"),
+        ("radii", [[1], [1], [1]], r"radii: has shape \(3, 1\)"),
+        ("radii", [1, -1, 1], r"radii\[1\] = -1.0: must lie between 0 and 1e\+150, or be NaN"),
+        ("radii", [1, 10**400, 1], "radii: has shape .* and dtype object"),
+        ("vertex_of_point", [0, 2], "vertex_of_point: has 2 rows for 3 points"),
+        ("vertex_of_point", [0, -2, 3], r"vertex_of_point\[1\] = -2: names a missing vertex"),
+        ("vertex_of_point", [0, 1, 1], r"points\[2\] = .*: must be finite, .* as vertex_of_point gives it a vertex"),
+        ("normals", [[0, 0, np.inf]] * 3, r"normals\[0\] = .*: must be unit vectors, or NaN"),
+        ("confidence", [0, 1.5, 0], r"confidence\[1\] = 1.5: must lie between 0 and 1, or be NaN"),
+        ("half_thickness", [1, 1, 2], r"half_thickness\[2\] = 2.0: must be at most half_width"),
+        ("support", [-1, 0, 0], r"support\[0\] = -1.0"),
+        ("report", {}, "report = {}: must be a Report"),
+    ],
+)
+def test_a_skeleton_is_sound_or_it_is_not_made(name, value, message):
+    Skeleton(**LINE)
+    with pytest.raises(InvalidParameterError, match=message):
+        Skeleton(**{**LINE, name: value})
+
+
+def test_what_is_not_known_is_filled_in_and_edges_are_sorted():
+    found = Skeleton(LINE["vertices"], [[2, 1], [1, 0]], (), (), LINE["points"], ())
+    assert found.edges.tolist() == [[0, 1], [1, 2]]
+    assert np.isnan(found.radii).tolist() == np.isnan(found.half_width).tolist() == [True] * 3
+    assert found.vertex_of_point.tolist() == [-1] * 3
+    assert np.isnan(found.normals).all()
+    assert found.normals.shape == (3, 3)

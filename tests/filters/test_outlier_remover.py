@@ -1,0 +1,187 @@
+"""Outliers, among themselves too."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import binary_dilation
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from glsk_o3d import OutlierRemover, RingBuilder, Sampler, samples, skeletonize
+from glsk_o3d.filters.outlier_remover import inliers
+from glsk_o3d.geometry.grid_sampling import sample_grid
+from glsk_o3d.geometry.neighbourhoods import mean_distances, nearest_neighbours
+
+K, N = 16, 12000
+SURFACE = samples.torus(N, ring_radius=0.4, radius=0.1).points
+
+
+def left(points, weight=None):
+    weight = np.ones(len(points)) if weight is None else weight
+    neighbours = nearest_neighbours(points, K)[1]
+    distance = mean_distances(points, neighbours)
+    return inliers(points, weight, neighbours, distance, np.zeros(len(points), bool), 2.5, 8)[0]
+
+
+def floating(n, seed=0, reach=0.6):
+    """Points anywhere in a box, but for those near to the surface."""
+    points = np.random.default_rng(seed).uniform(-reach, reach, (4 * n, 3))
+    return points[cKDTree(SURFACE).query(points)[0] > 0.05][:n]
+
+
+@pytest.mark.parametrize("n", [1, 200])
+def test_points_that_float_around_a_surface(n):
+    """A few stand out alone; many have each other for neighbours."""
+    points = np.concatenate([SURFACE, floating(n)])
+    np.testing.assert_array_equal(left(points), np.arange(N))
+
+
+@pytest.mark.parametrize("n", [5, 300])
+def test_islands_far_away(n):
+    """Whether their neighbourhoods reach back to the surface, or hold nothing but themselves."""
+    island = [3, 0, 0] + np.random.default_rng(1).uniform(-0.3, 0.3, (n, 3))
+    np.testing.assert_array_equal(left(np.concatenate([SURFACE, island])), np.arange(N))
+
+
+@pytest.mark.parametrize(("n", "shift"), [(300, 3), (800, 0.7)])
+def test_sparse_surfaces_stay(n, shift):
+    """A part of its own with a tenth of the points for its area, and one with a quarter that touches the other."""
+    part = samples.torus(n, ring_radius=0.2, radius=0.05).points + [shift, 0, 0]
+    assert len(left(np.concatenate([SURFACE, part]))) == N + n
+
+
+@pytest.mark.parametrize("scale", [0.2, 4])
+def test_another_noisy_object_stays(scale):
+    """However much coarser it is: a tenth of the points are no outliers."""
+    other = scale * samples.torus(3000, noise=0.02, seed=1).points + [4, 0, 0]
+    assert len(left(np.concatenate([SURFACE, other]))) > N + 2900
+
+
+def test_where_each_point_stands_for_many():
+    """A sample evens out the density that tells a surface from what floats around it; the weight knows it."""
+    dense = samples.torus(60000, ring_radius=0.4, radius=0.1).points
+    gas = floating(2500)
+    kept, _, counts = sample_grid(np.concatenate([dense, gas]), 12000)
+    points, true = np.concatenate([dense, gas])[kept], kept < len(dense)
+    found = np.ones(len(kept), bool)
+    found[left(points, counts)] = False
+    assert not found[true].any()
+    assert found[~true].mean() > 0.99
+
+
+def test_it_does_not_matter_how_the_cloud_lies():
+    points = np.concatenate([SURFACE, floating(300), [3, 0, 0] + floating(40)])
+    kept = left(points)
+    rng = np.random.default_rng(0)
+    turned = 7 * points @ Rotation.random(random_state=rng).as_matrix().T + [1, 2, 3]
+    np.testing.assert_array_equal(left(turned), kept)
+    order = rng.permutation(len(points))
+    np.testing.assert_array_equal(np.sort(order[left(points[order])]), kept)
+
+
+# ---- the filter
+
+
+TORUS = samples.torus(n=600).points
+ALL, STRICT = Sampler(), Sampler() | OutlierRemover()
+
+
+def group(n, wide, seed=4):
+    """Points beside the torus."""
+    return [1.5, 0, 1] + wide * np.random.default_rng(seed).normal(size=(n, 3))
+
+
+@pytest.mark.parametrize("seed", [2, 9])
+def test_a_group_of_outliers_that_hide_each_other_is_found_in_rounds(seed):
+    """At first most of ten have others among their neighbours that are as far off."""
+    points = np.concatenate([TORUS, group(10, 0.4, seed)])
+    state = (STRICT | RingBuilder())(points)
+    np.testing.assert_array_equal(state.outlier, np.arange(610) >= 600)
+    assert (state.report.n_outliers, state.report.n_distinct) == (10, 600)
+    assert not STRICT(points[~state.outlier]).outlier.any()  # nothing more is found
+    assert not (ALL | OutlierRemover(outlier_factor=0))(points).outlier.any()
+
+
+@pytest.mark.parametrize("outliers", [np.outer([1, 2, 4, 8, 16], [1, 0.3, 1]), group(6, 0.01), group(10, 0.4)])
+def test_what_is_left_is_the_cloud_without_them(outliers):
+    order = np.random.default_rng(0).permutation(600 + len(outliers))
+    mixed = np.concatenate([TORUS, outliers])[order]
+    state, clean = STRICT(mixed), STRICT(TORUS)
+    np.testing.assert_array_equal(state.outlier, order >= 600)
+    np.testing.assert_allclose(state.cloud, clean.cloud, atol=1e-15)  # sums in another order
+    np.testing.assert_array_equal(state.neighbours, clean.neighbours)
+    assert state.frame.diagonal == pytest.approx(clean.frame.diagonal, rel=1e-15)
+    kept = order < 600
+    np.testing.assert_array_equal(state.representative_of_point[kept], clean.representative_of_point[order[kept]])
+    # outliers go with the nearest point that is none
+    nearest = cKDTree(TORUS).query(mixed[~kept])[1]
+    np.testing.assert_array_equal(state.representative_of_point[~kept], clean.representative_of_point[nearest])
+
+
+# ---- mixed pixels of a depth camera
+
+
+def veiled(points, share, seed=0, reach=0.3, across=0.01):
+    """A cloud seen from above, and after it mixed pixels: a veil below its outline, down to the ground."""
+    rng = np.random.default_rng(seed)
+    hull = points[np.argsort(-np.linalg.norm(points[:, :2], axis=1))[: len(points) // 8]]  # near the outer outline
+    veil = hull[rng.choice(len(hull), round(share * len(points)), replace=False)].copy()
+    veil[:, :2] += rng.normal(0, across, (len(veil), 2))
+    veil[:, 2] -= rng.uniform(0.12, 0.12 + reach, len(veil))
+    return np.concatenate([points, veil])
+
+
+RING = samples.torus(4000, ring_radius=0.4, radius=0.1).points
+
+
+@pytest.mark.parametrize("share", [0.03, 0.05, 0.08])
+def test_a_veil_of_mixed_pixels_goes(share):
+    points = veiled(RING, share)
+    state = STRICT(points)
+    assert state.report.n_mixed > 0
+    assert state.outlier[4000:].mean() > 0.85
+    assert state.outlier[:4000].mean() < 0.01
+
+
+def test_a_few_mixed_pixels_are_asked_for_by_their_neighbours_alone():
+    points = veiled(RING, 0.004)
+    state = STRICT(points)
+    assert state.report.n_mixed == 0
+    assert not state.outlier[:4000].any()
+
+
+def test_twigs_and_noise_are_no_mixed_pixels():
+    """Where little of a cloud is a surface, sparse points are parts of it."""
+    for shape in (samples.tree(4096, forks=6, seed=1), samples.torus(4000, noise=0.03)):
+        assert STRICT(shape.points).report.n_mixed == 0
+
+
+def test_thin_wires_on_a_body_stay():
+    """As dense along them as the surface of the body, with which no camera sees less."""
+    body = samples.torus(6000, ring_radius=0.4, radius=0.1).points
+    along = np.linspace(0, 0.5, 60)
+    wires = np.concatenate([[0.5 * np.cos(a), 0.5 * np.sin(a), 0] + np.outer(along, [0, 0, 1]) for a in range(6)])
+    points = np.concatenate([body, wires + np.random.default_rng(0).normal(0, 0.002, wires.shape)])
+    assert not STRICT(points).outlier[6000:].any()
+
+
+def star_from_above(seed, pitch=0.012, radius=0.03, arms=6):
+    """Half a ball with thin arms on a grid of pixels, and mixed pixels beside its outline, down to the ground."""
+    rng, steps = np.random.default_rng(seed), np.arange(-1, 1, pitch)
+    grid = np.stack(np.meshgrid(steps, steps), axis=-1)
+    squared = 0.2**2 - (grid**2).sum(axis=-1)
+    for angle in np.arange(arms) * 2 * np.pi / arms:
+        along, off = np.moveaxis(grid @ [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]], -1, 0)
+        squared = np.maximum(squared, np.where((along > 0) & (along < 0.9), radius**2 - off**2, -1))
+    hit = squared > 0
+    outline = np.argwhere(binary_dilation(hit) & ~hit)
+    mixed = grid[tuple(outline[rng.choice(len(outline), round(0.08 * hit.sum()), replace=False)].T)]
+    surface = np.column_stack([grid[hit], np.sqrt(squared[hit]) + rng.normal(0, 0.001, hit.sum())])
+    return np.concatenate([surface, np.column_stack([mixed, rng.uniform(-0.3, -0.02, len(mixed))])])
+
+
+@pytest.mark.filterwarnings("ignore:weakly supported")  # half of every arm is unseen
+@pytest.mark.parametrize("seed", range(3))
+def test_no_hairs_grow_in_a_veil(seed):
+    found = skeletonize(star_from_above(seed))
+    assert (found.n_components, found.n_loops, len(found.leaves), found.report.n_traced) == (1, 0, 6, 0)
+    assert found.report.n_mixed > 0

@@ -1,0 +1,170 @@
+"""Thinning: who is left, who speaks for whom, and that nothing else decides it."""
+
+import numpy as np
+import pytest
+
+from glsk_o3d import (
+    Connector,
+    Contractor,
+    Denoiser,
+    LPRReducer,
+    OutlierRemover,
+    Refiner,
+    RingBuilder,
+    StageError,
+    Thinner,
+    samples,
+)
+from glsk_o3d.filters.denoiser import MOST_IN_ONE, average_noisy
+from glsk_o3d.filters.thinner import ENOUGH, default_size, spacing_enough, thin, thin_nearer
+from glsk_o3d.geometry.grid_sampling import sample_grid
+from glsk_o3d.geometry.neighbourhoods import nearest_neighbours, principal
+
+
+def thinned(points, n, k=16):
+    return thin(points, nearest_neighbours(points, min(k, len(points)))[1], n)
+
+
+def left(into):
+    return np.flatnonzero(into == np.arange(len(into)))
+
+
+@pytest.fixture(scope="module")
+def surface():
+    return samples.torus(3000).points
+
+
+@pytest.mark.parametrize("n", [1, 7, 750, 2999, 3000])
+def test_exactly_so_many_are_left_and_all_others_have_one_of_them(surface, n):
+    into = thinned(surface, n)
+    assert len(left(into)) == n
+    np.testing.assert_array_equal(into[into], into)
+
+
+def test_nearest_pairs_go_first():
+    """Pairs 1, 2, 3, ... apart, far from each other: the n nearest ones are merged."""
+    first = np.column_stack([100.0 * np.arange(10), np.zeros(10), np.zeros(10)])
+    points = np.concatenate([first, first + np.outer(np.arange(1, 11), [0, 1, 0])])
+    for merged in range(11):
+        into = thinned(points, 20 - merged)
+        np.testing.assert_array_equal(into[:merged] == into[10 : 10 + merged], True)
+        assert len(left(into)) == 20 - merged
+        assert (into[merged:10] == np.arange(merged, 10)).all()
+
+
+# ---- where there are more than enough
+
+
+def evened(points, around):
+    neighbours = nearest_neighbours(points, 16)[1]
+    apart = spacing_enough(points, neighbours, principal(points, neighbours)[0], around)
+    return thin_nearer(points, neighbours, apart), apart
+
+
+@pytest.mark.parametrize("noise", [0, 0.2])
+def test_dense_tubes_are_merged_as_far_as_allowed_and_sparse_ones_stay(noise):
+    """A cylinder with 100 points around it, and one with half as many as are enough; noise in units of the spacing."""
+    for many, around in ((100, 40), (20, 40)):
+        rng, spacing = np.random.default_rng(0), 2 * np.pi / many
+        n = int(2 * np.pi * 20 / spacing**2)
+        turn = rng.uniform(0, 2 * np.pi, n)
+        points = np.column_stack([np.cos(turn), np.sin(turn), rng.uniform(0, 20, n)])
+        points += rng.normal(0, noise * spacing, points.shape)
+        into, apart = evened(points, around)
+        np.testing.assert_array_equal(into[into], into)
+        assert np.median(apart) <= 2.1 * spacing  # twice the spacing at a time
+        if many == 100:
+            assert len(left(into)) < 0.3 * n
+        else:
+            assert len(left(into)) > 0.7 * n
+            assert (np.linalg.norm(points - points[into], axis=1) < spacing).all()
+
+
+def test_a_plane_has_its_share_of_the_points_that_are_enough():
+    """No part of it is thin, so that only their number says how far apart they may be."""
+    points = np.column_stack([np.random.default_rng(0).uniform(0, 1, (9000, 2)), np.zeros(9000)])
+    assert len(left(evened(points, 20)[0])) == pytest.approx(ENOUGH, rel=0.1)
+
+
+# ---- on a grid
+
+
+@pytest.mark.parametrize("n", [100, 700])
+def test_a_grid_keeps_about_so_many_each_the_nearest_to_the_middle_of_its_cell(surface, n):
+    kept, into, counts = sample_grid(surface, n)
+    np.testing.assert_array_equal(counts, np.bincount(into))
+    assert 0.6 * n < len(kept) < 1.7 * n
+    np.testing.assert_array_equal(into[kept], np.arange(len(kept)))
+    for cell in range(len(kept)):
+        members = np.flatnonzero(into == cell)
+        away = np.linalg.norm(surface[members] - surface[members].mean(axis=0), axis=1)
+        assert away[members == kept[cell]] <= away.min() * (1 + 1e-12)
+    # cells are cubes of one size, anywhere along the axes
+    spans = [np.ptp(surface[into == cell], axis=0).max() for cell in range(len(kept))]
+    assert max(spans) < 3 * np.ptp(surface, axis=0).max() / np.sqrt(n)
+
+
+# ---- averaging
+
+
+def test_means_of_noisy_points(surface):
+    rng, n = np.random.default_rng(0), 300
+    near = nearest_neighbours(surface, 16)[1]
+    noise = np.where(surface[:, 0] > 0, rng.uniform(0.1, 1, 3000), 0)
+    weight = rng.uniform(1, 9, 3000)
+    into, mean, total = average_noisy(surface, near, noise, weight, n)
+    size = np.bincount(into)
+    assert size.max() == np.floor(min(MOST_IN_ONE, np.count_nonzero(noise) / n))
+    assert n <= len(np.unique(into[noise > 0])) < np.count_nonzero(noise) / 1.5
+    np.testing.assert_allclose(total, np.bincount(into, weight), rtol=1e-12)
+    for group in (0, len(mean) // 2, int(np.argmax(size))):
+        rows = np.flatnonzero(into == group)
+        np.testing.assert_allclose(mean[group], np.average(surface[rows], axis=0, weights=weight[rows]), rtol=1e-12)
+    clean = noise == 0
+    assert (size[into[clean]] == 1).all()
+    np.testing.assert_allclose(mean[into[clean]], surface[clean], rtol=1e-15)
+
+
+# ---- the filter
+
+
+@pytest.mark.parametrize(
+    ("n", "size"), [(8, 8), (25000, 25000), (25001, 25000), (152588, 25000), (160000, 25600), (10**6, 64000)]
+)
+def test_points_to_contract_by_the_number_of_points(n, size):
+    assert default_size(n) == size
+
+
+@pytest.mark.parametrize("late", [OutlierRemover(), Denoiser()])
+def test_what_looks_at_every_point_comes_before(late):
+    with pytest.raises(StageError, match="comes before Thinner"):
+        (Thinner() | late)(samples.torus(5000).points)
+
+
+def test_thinned_clouds_keep_all_points_and_their_mass():
+    points, n = samples.torus(2000).points, 500
+    state, whole = (Thinner(around=0, thin_to=n) | RingBuilder())(points), RingBuilder()(points)
+    assert len(state) == n == state.report.n_contracted < len(whole) == 2000
+    assert state.report.n_sampled == state.report.n_distinct == 2000
+    assert len(Thinner(thin_to="all")(points)) == 2000
+    assert state.sampled.all()
+    np.testing.assert_array_equal(state.cloud, whole.cloud)
+    np.testing.assert_array_equal(state.normals, whole.normals)
+    np.testing.assert_array_equal(state.positions, state.cloud[state.survivors])
+    np.testing.assert_array_equal(state.representative[state.survivors], np.arange(n))
+    np.testing.assert_allclose(state.mass, np.bincount(state.representative) * n / 2000, rtol=1e-14)
+    skeleton = (Contractor(reducer=LPRReducer()) | Connector() | Refiner())(state)
+    assert len(skeleton.vertex_of_point) == 2000
+    assert skeleton.n_loops == 1
+
+
+def test_thin_parts_keep_their_points():
+    """A thick and a thin tube, equally dense: the thick one is merged, the thin one stays."""
+    thick, thin_ = samples.tube(9000, radius=0.3, length=1.5).points, samples.tube(600, radius=0.02, length=1.5).points
+    state = Thinner()(np.concatenate([thick, thin_ + [0, 1, 0]]))
+    kept = state.point_of_survivor
+    assert (kept < 9000).sum() < 0.5 * 9000
+    assert (kept >= 9000).sum() > 0.7 * 600  # not those that are nearer than a twentieth of the way around
+    gone = np.setdiff1d(np.arange(9000, 9600), kept) - 9000
+    nearest = np.linalg.norm(thin_[gone, None] - thin_[kept[kept >= 9000] - 9000], axis=2).min(axis=1)
+    assert np.quantile(nearest, 0.8) < np.sqrt(2 * np.pi * 0.02 * 1.5 / 600)  # their spacing
