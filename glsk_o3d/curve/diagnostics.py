@@ -1,11 +1,11 @@
-"""Warnings about places without a meaningful curve skeleton: sheets, balls, and points that do not determine it."""
+"""Warnings about places without a meaningful curve curve: sheets, balls, and points that do not determine it."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from ..data.decisions import coordinates
-from ..data.skeleton import Skeleton
+from .curve import Curve
 from ..geometry.groups import component_labels, group_median, group_sum
 from ..geometry.vectors import dot, norm
 from .axis.sections import VertexPoints, measure_sections
@@ -25,19 +25,19 @@ REASONS = ("sheet-like", "sphere-like", "no edges", "uncertain topology", "weakl
 """What the messages of `diagnose` begin with."""
 
 
-def measured(skeleton: Skeleton) -> Skeleton:
-    """A finished skeleton with its sections, and with the reasons not to trust it among the warnings of its report.
+def measured(curve: Curve) -> Curve:
+    """A finished curve with its sections, and with the reasons not to trust it among the warnings of its report.
 
     They take the place of those of before, and follow what other filters warned of.
     """
-    sections = measure_sections(skeleton)
-    skeleton = with_fields(skeleton, half_width=sections.half_width, half_thickness=sections.half_thickness)
-    others = [message for message in skeleton.report.warnings if message.partition(":")[0] not in REASONS]
-    return replace(skeleton, report=replace(skeleton.report, warnings=(*others, *diagnose(skeleton))))
+    sections = curve.sections
+    curve = curve.changed(half_width=sections.half_width, half_thickness=sections.half_thickness)
+    others = [message for message in curve.report.warnings if message.partition(":")[0] not in REASONS]
+    return curve.changed(report=replace(curve.report, warnings=(*others, *diagnose(curve))))
 
 
-def diagnose(skeleton: Skeleton) -> list[str]:
-    """Reasons not to trust a skeleton: the cloud is sheet-like, sphere-like, or does not say where much of the axis is.
+def diagnose(curve: Curve) -> list[str]:
+    """Reasons not to trust a curve: the cloud is sheet-like, sphere-like, or does not say where much of the axis is.
 
     Sheet-like: the normals around a vertex have one direction, and it has little confidence, unlike a blade, which has
     two sides; or it is of a component whose curve is hardly longer than the part is wide: a coin, a plate. Sphere-like:
@@ -45,27 +45,27 @@ def diagnose(skeleton: Skeleton) -> list[str]:
     cloud that is neither, the parts with little confidence are named, and the least certain question about loops, air
     and gaps. No edges at all are a reason, too.
     """
-    cloud = VertexPoints(skeleton)
+    cloud = curve.cloud
     if len(cloud.rows) == 0:
         return []
     vertex, normals, count = cloud.vertex, cloud.normals, cloud.count
     along = np.einsum("ni,nj->nij", normals, normals)
 
-    part, n = skeleton.component_of_vertex, skeleton.n_components
+    part, n = curve.component_of_vertex, curve.n_components
     component = part[vertex]
     size = np.bincount(component, minlength=n)[:, None]
     one_way = np.linalg.eigvalsh(group_sum(along, vertex, len(count)))[:, 2] > SHEET_SHARE * np.maximum(count, 1)
-    curve = np.bincount(part[skeleton.edges[:, 0]], skeleton.edge_lengths, n)
-    stub = curve < STUB_LENGTH * group_median(skeleton.half_width[vertex], component, n)
-    sheet = count[one_way & (~(skeleton.confidence >= LOW_CONFIDENCE) | stub[part])].sum() / len(vertex)
+    curve = np.bincount(part[curve.edges[:, 0]], curve.edge_lengths, n)
+    stub = curve < STUB_LENGTH * group_median(curve.half_width[vertex], component, n)
+    sheet = count[one_way & (~(curve.confidence >= LOW_CONFIDENCE) | stub[part])].sum() / len(vertex)
     if sheet > MAJORITY:
         return [
             f"sheet-like: around {sheet:.0%} of the points the surface faces one direction only, "
-            "so a curve skeleton has little meaning; if that is a table or a floor under an object, remove it first, "
+            "so a curve curve has little meaning; if that is a table or a floor under an object, remove it first, "
             "with Open3D's segment_plane or read_cloud(..., where='z > ...')"
         ]
 
-    points = cloud.points - skeleton.vertices[0]
+    points = cloud.points - curve.vertices[0]
     # of every normal line I - n n^T, which takes away what is along it
     weight = (size[:, :, None] + 1e-9 * np.maximum(size, 1)[:, :, None]) * np.eye(3) - group_sum(along, component, n)
     height = dot(normals, points)[:, None]
@@ -79,7 +79,7 @@ def diagnose(skeleton: Skeleton) -> list[str]:
     if share > MAJORITY:
         return [
             f"sphere-like: the normals of parts with {share:.0%} of the points meet in one point, "
-            "so no curve skeleton is meaningful there"
+            "so no curve curve is meaningful there"
         ]
     spread = group_sum(np.einsum("ni,nj->nij", points, points), component, n) / np.maximum(size, 1)[:, :, None]
     mean = group_sum(points, component, n) / np.maximum(size, 1)
@@ -89,18 +89,18 @@ def diagnose(skeleton: Skeleton) -> list[str]:
     if share > MAJORITY:
         return [
             f"sphere-like: parts with {share:.0%} of the points are hardly longer than thick, "
-            "so no curve skeleton is meaningful there"
+            "so no curve curve is meaningful there"
         ]
-    if len(skeleton.edges) == 0:
+    if len(curve.edges) == 0:
         return ["no edges: every part became one vertex; is Connector.radius larger than the parts are long?"]
-    return _weak_region(skeleton, count) + _close_calls(skeleton)
+    return _weak_region(curve, count) + _close_calls(curve)
 
 
-def _close_calls(skeleton: Skeleton) -> list[str]:
-    close = [it for it in skeleton.report.uncertain if it.about != "limb"]
+def _close_calls(curve: Curve) -> list[str]:
+    close = [it for it in curve.report.uncertain if it.about != "limb"]
     if not close:
         return []
-    asked = sum(it.about != "limb" for it in skeleton.report.decisions)
+    asked = sum(it.about != "limb" for it in curve.report.decisions)
     return [
         f"uncertain topology: {len(close)} of {asked} questions about loops, air and gaps were close calls, above all "
         f"whether {close[0].question} (probability {close[0].probability:.2f}): look there; "
@@ -108,15 +108,15 @@ def _close_calls(skeleton: Skeleton) -> list[str]:
     ]
 
 
-def _weak_region(skeleton: Skeleton, count: np.ndarray) -> list[str]:
-    weak = skeleton.confidence < LOW_CONFIDENCE
+def _weak_region(curve: Curve, count: np.ndarray) -> list[str]:
+    weak = curve.confidence < LOW_CONFIDENCE
     share = count[weak].sum() / count.sum()
     if share <= LOW_CONFIDENCE_SHARE:
         return []
-    inner = skeleton.edges[weak[skeleton.edges].all(axis=1)]
+    inner = curve.edges[weak[curve.edges].all(axis=1)]
     label = component_labels(len(weak), inner)
     most = np.argmax(np.bincount(label[weak], count[weak], minlength=len(weak)))
-    region = skeleton.vertices[weak & (label == most)]
+    region = curve.vertices[weak & (label == most)]
     middle = region.mean(axis=0)
     reach, place = norm(region - middle).max(), coordinates(middle)
     return [

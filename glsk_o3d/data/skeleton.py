@@ -3,27 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from copy import copy
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InvalidParameterError, brief
-from ..geometry.groups import component_labels
-from ..geometry.paths import maximal_paths
-from ..geometry.radii import supporting_points
-from ..geometry.vectors import FARTHEST_PLACE, norm
+from ..geometry.vectors import FARTHEST_PLACE
 from ..interop.packages import import_open3d, require
 from ..parameters import shown
+from .graph import OF_VERTICES, Graph, in_order_of_ends
 from .report import Report
 
 if TYPE_CHECKING:
     import networkx
     import open3d
 
-OF_VERTICES = ("radii", "confidence", "half_width", "half_thickness", "support")
-"""What is known of every vertex but its place."""
 ARRAYS: dict[str, tuple[tuple[int, ...], type]] = {
     "vertices": ((3,), float),
     "edges": ((2,), int),
@@ -35,15 +31,14 @@ ARRAYS: dict[str, tuple[tuple[int, ...], type]] = {
     "half_width": ((), float),
     "half_thickness": ((), float),
     "support": ((), float),
+    "representative_of_point": ((), int),
 }
 """The arrays of a skeleton: the shape of a row and the type of each. The one field more is ``report``."""
-NOT_MEASURED: dict[str, Any] = dict.fromkeys(OF_VERTICES[1:])
-"""For `replace`, where vertices are others than before."""
 UNIT = 1.001  # derived: a unit vector that was written in three digits is one
 
 
 @dataclass(frozen=True, eq=False)
-class Skeleton:
+class Skeleton(Graph):
     """A curve skeleton: a graph embedded in space, in the units of the cloud it was made from.
 
     All fields are checked. Arrays without rows mean unknown values and are filled with NaN, or -1 for
@@ -76,6 +71,9 @@ class Skeleton:
         radius if not measured.
     support : (M,) float64 array
         Share of samples of the cloud whose skeletons show the curve there, see `glsk_o3d.support`; NaN if not measured.
+    representative_of_point : (N,) int64 array
+        Of a skeleton that is to be refined the point by which a Refiner knows the surface at each input point: itself,
+        or another one; -1 for the nearest of these, or if unknown.
 
     Raises
     ------
@@ -106,16 +104,20 @@ class Skeleton:
     half_width: np.ndarray = None  # type: ignore[assignment]
     half_thickness: np.ndarray = None  # type: ignore[assignment]
     support: np.ndarray = None  # type: ignore[assignment]
+    representative_of_point: np.ndarray = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         _complete(self)
         with np.errstate(all="ignore"):  # numbers that are refused may overflow
             _check_values(self)
-        first, second = self.edges.T
-        if (first > second).any() or (np.diff(first * len(self.vertices) + second) <= 0).any():
-            edges = np.sort(self.edges, axis=1)
-            object.__setattr__(self, "edges", edges[np.lexsort(edges.T[::-1])])
-            _refuse(self, "edges", ~np.diff(self.edges, axis=0).any(axis=1), "is there twice")
+        object.__setattr__(self, "edges", in_order_of_ends(self.edges, len(self.vertices)))
+        _refuse(self, "edges", ~np.diff(self.edges, axis=0).any(axis=1), "is there twice")
+
+    def with_report(self, report: Report) -> Skeleton:
+        """The same with another record of the run."""
+        other = copy(self)  # what was checked need not be checked again
+        object.__setattr__(other, "report", report)
+        return other
 
     def __repr__(self) -> str:
         return (
@@ -123,31 +125,14 @@ class Skeleton:
             f"{self.n_loops} loops, {len(self.leaves)} leaves, {len(self.junctions)} junctions)"
         )
 
-    @cached_property
-    def degree(self) -> np.ndarray:
-        """Edges at every vertex, (M,) int array."""
-        return np.bincount(self.edges.ravel(), minlength=len(self.vertices))
-
-    @cached_property
-    def supporting_points(self) -> np.ndarray:
-        """Input points with a vertex and a normal, which determine the skeleton, int array."""
-        return supporting_points(self.vertex_of_point, self.normals)
-
-    @cached_property
+    @property
     def surface_points(self) -> np.ndarray:
-        """Supporting points by which a Refiner is to know the surface, int array.
+        """Supporting points by which a Refiner knows the surface, int array.
 
-        Those of `Contraction.surface_points` if a Connector has just made it, and all once it was changed.
+        Those that represent themselves; of a skeleton without representatives all.
         """
-        return self.supporting_points
-
-    @cached_property
-    def stand_ins(self) -> np.ndarray:
-        """For every input point the one of a sample that stands for it, itself if it is of the sample, (N,) int array.
-
-        Those of `Contraction.stand_ins` if a Connector has just made it, and each for itself once it was changed.
-        """
-        return np.arange(len(self.points))
+        own = self.representative_of_point == np.arange(len(self.points))
+        return np.flatnonzero(own) if own.any() else self.supporting_points
 
     @property
     def whole(self) -> Skeleton:
@@ -158,50 +143,6 @@ class Skeleton:
     def lacks_sample(self) -> bool:
         """Whether its mesh was sampled, and it was changed and has the vertices alone: they do not show the object."""
         return 0 < self.report.n_by_area > len(self.whole.points) - self.report.n_input
-
-    @property
-    def leaves(self) -> np.ndarray:
-        """Vertices with one edge, int array."""
-        return np.flatnonzero(self.degree == 1)
-
-    @property
-    def junctions(self) -> np.ndarray:
-        """Vertices with more than two edges, int array."""
-        return np.flatnonzero(self.degree > 2)
-
-    @cached_property
-    def component_of_vertex(self) -> np.ndarray:
-        """Connected component of every vertex, (M,) int array."""
-        return component_labels(len(self.vertices), self.edges)
-
-    @property
-    def n_components(self) -> int:
-        """Connected components."""
-        return int(self.component_of_vertex.max(initial=-1)) + 1
-
-    @property
-    def n_loops(self) -> int:
-        """Cycle rank: independent loops of the graph."""
-        return len(self.edges) - len(self.vertices) + self.n_components
-
-    @property
-    def length(self) -> float:
-        """Total length of the edges, in the cloud's units."""
-        return float(self.edge_lengths.sum())
-
-    @property
-    def edge_lengths(self) -> np.ndarray:
-        """Length of every edge, (E,) float array."""
-        ends = self.vertices[self.edges]
-        return norm(ends[:, 1] - ends[:, 0])
-
-    @cached_property
-    def branches(self) -> tuple[np.ndarray, ...]:
-        """Maximal paths between leaves and junctions, as vertex indices in order.
-
-        A loop without a junction starts and ends at the same vertex. A vertex without edges is no branch.
-        """
-        return tuple(np.array(vertices) for vertices, _ in maximal_paths(len(self.vertices), self.edges))
 
     def to_networkx(self) -> networkx.Graph:
         """The graph with the attributes of every vertex.
@@ -255,8 +196,10 @@ def of_input(skeleton: Skeleton) -> Skeleton:
     n, report = len(skeleton.points), skeleton.report
     if not report.n_by_area or n != report.n_input + report.n_by_area:
         return skeleton
-    some = {name: getattr(skeleton, name)[: report.n_input] for name in ("points", "normals", "vertex_of_point")}
-    given = replace(skeleton, **some)
+    given = skeleton.changed(
+        **{name: getattr(skeleton, name)[: report.n_input] for name in ("points", "normals", "vertex_of_point")},
+        representative_of_point=None,
+    )
     vars(given)["_whole"] = skeleton
     return given
 
@@ -286,7 +229,7 @@ def _complete(skeleton: Skeleton) -> None:
             meant = f"{'whole ' * (kind is int)}numbers, {columns[0] if columns else 1} a row"
             raise InvalidParameterError(f"{name}: has shape {array.shape} and dtype {array.dtype}: must be {meant}")
         arrays[name] = array.astype(kind, copy=False)
-    for name in (*OF_VERTICES, "vertex_of_point", "normals"):
+    for name in (*OF_VERTICES, "vertex_of_point", "normals", "representative_of_point"):
         owner = "vertices" if name in OF_VERTICES else "points"
         given, wanted = arrays[name], len(arrays[owner])
         if len(given) not in (0, wanted):
@@ -309,6 +252,7 @@ def _check_values(skeleton: Skeleton) -> None:
     _check_range(skeleton, "edges", 0, m - 1, there)
     _refuse(skeleton, "edges", skeleton.edges[:, 0] == skeleton.edges[:, 1], "joins a vertex with itself")
     _check_range(skeleton, "vertex_of_point", -1, m - 1, there)
+    _check_range(skeleton, "representative_of_point", -1, len(owner) - 1, "names a missing point")
     owned = f"{finite}, as vertex_of_point gives it a vertex"
     _check_range(skeleton, "points", -FARTHEST_PLACE, FARTHEST_PLACE, owned, lambda points: (owner < 0)[:, None])
     _check_range(skeleton, "normals", -UNIT, UNIT, "must be unit vectors, or NaN", unless=np.isnan)

@@ -1,4 +1,4 @@
-"""Fit the skeleton to the axis of the surface around it."""
+"""Fit the curve to the axis of the surface around it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import bsr_array, csc_array
 
-from ...data.skeleton import Skeleton
+from ..curve import Curve
 from ...geometry.groups import group_sum
 from ...geometry.neighbourhoods import nearest_neighbours
 from ...geometry.polylines import incident_edges, nearest_on_edges, places_on_edges
@@ -36,21 +36,21 @@ HALF_SUPPORT = 8  # fitted: points that support a vertex half; an edge has a pie
 HALF_TUBE_REACH = (2 / np.pi) / np.sqrt(1 - (2 / np.pi) ** 2)
 
 
-def pull_back_detached(skeleton: Skeleton) -> Skeleton:
+def pull_back_detached(curve: Curve) -> Curve:
     """Pull vertices as near to the mean of their points as half a tube's axis is.
 
     Thin tips leave their points in late solves. A vertex without points stays.
     """
-    cloud, m = VertexPoints(skeleton), len(skeleton.vertices)
+    cloud, m = curve.cloud, len(curve.vertices)
     count = np.maximum(cloud.count, 1)
     mean = group_sum(cloud.offset, cloud.vertex, m) / count[:, None]
-    spread = group_sum((cloud.points - (skeleton.vertices + mean)[cloud.vertex]) ** 2, cloud.vertex, m).sum(axis=1)
+    spread = group_sum((cloud.points - (curve.vertices + mean)[cloud.vertex]) ** 2, cloud.vertex, m).sum(axis=1)
     reach, away = HALF_TUBE_REACH * np.sqrt(spread / count), norm(mean)
     back = 1 - np.minimum(reach, away) / np.maximum(away, TINY)
-    return with_fields(skeleton, vertices=skeleton.vertices + back[:, None] * mean)
+    return curve.changed(vertices=curve.vertices + back[:, None] * mean)
 
 
-def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = None, settle: bool = False) -> Skeleton:
+def fit_axis(curve: Curve, passes: int, surface: SurfaceGraph | None = None, settle: bool = False) -> Curve:
     r"""Move the vertices to the axis of the surface; measure how well the points say where it is, and how far it is.
 
     The plane through a point p of a limb, spanned by its normal n and the tangent t of the axis, contains the axis:
@@ -82,42 +82,42 @@ def fit_axis(skeleton: Skeleton, passes: int, surface: SurfaceGraph | None = Non
     the section, see `robust_radii`, or without passes `plane_distance_radii`. Points belong to the vertex nearest to
     their place.
     """
-    m, ends = len(skeleton.vertices), skeleton.edges
-    points, owner = skeleton.supporting_points, skeleton.vertex_of_point.copy()
-    points = points[skeleton.degree[owner[points]] > 0]
+    m, ends = len(curve.vertices), curve.edges
+    points, owner = curve.supporting_points, curve.vertex_of_point.copy()
+    points = points[curve.degree[owner[points]] > 0]
     if len(points) == 0:
-        radii = plane_distance_radii(skeleton.vertices, owner, skeleton.points, skeleton.normals, skeleton.radii)
-        return with_fields(skeleton, confidence=np.zeros(m), radii=radii)
-    centre = skeleton.vertices.mean(axis=0)
-    x, p, n = skeleton.vertices - centre, skeleton.points[points] - centre, skeleton.normals.take(points, axis=0)
+        radii = plane_distance_radii(curve.vertices, owner, curve.points, curve.normals, curve.radii)
+        return curve.changed(confidence=np.zeros(m), radii=radii)
+    centre = curve.vertices.mean(axis=0)
+    x, p, n = curve.vertices - centre, curve.points[points] - centre, curve.normals.take(points, axis=0)
     vertex, edges_at = owner[points], incident_edges(ends, m)
-    pattern = _Pattern(skeleton, edges_at)
+    pattern = _Pattern(curve, edges_at)
     low, high = axis_box(p)
     onto = nearest_on_edges(x, ends, edges_at[vertex], p)
     if passes:
-        surface = surface or SurfaceGraph.of(skeleton)
+        surface = surface or SurfaceGraph.of(curve)
         smooth = _smoother(surface, points, p)
         spacing = surface.spacing * np.sqrt(len(surface.points) / len(points))
-        width = skeleton.half_width if settle else _nearest(x, ends, *onto, p, n, skeleton.radii).width
+        width = curve.half_width if settle else _nearest(x, ends, *onto, p, n, curve.radii).width
     for again in range(passes):
         onto = nearest_on_edges(x, ends, edges_at[vertex], p) if again else onto
         place = smooth(places_on_edges(x, ends, *onto), FIT_DIFFUSION * width[vertex])
         vertex, edge, t = _walked(x, ends, edges_at, vertex, place)
-        near = _nearest(x, ends, edge, t, p, n, skeleton.radii, sides=settle)
+        near = _nearest(x, ends, edge, t, p, n, curve.radii, sides=settle)
         x, width = _solve(x, near, p, pattern, settle), near.width
         # normals that mean nothing may meet anywhere
-        x = np.where(skeleton.degree[:, None] > 0, np.clip(x, low, high), x)
+        x = np.where(curve.degree[:, None] > 0, np.clip(x, low, high), x)
     onto = nearest_on_edges(x, ends, edges_at[vertex], place) if passes else onto
-    near = _nearest(x, ends, *onto, p, n, skeleton.radii, sides=settle)
+    near = _nearest(x, ends, *onto, p, n, curve.radii, sides=settle)
     owner[points] = vertex
-    radii = plane_distance_radii(x + centre, owner, skeleton.points, skeleton.normals, skeleton.radii)
+    radii = plane_distance_radii(x + centre, owner, curve.points, curve.normals, curve.radii)
     if passes:  # the distance from a curve that nobody has centred is no radius
         equal = np.where(near.support > 0, near.sections.radius, radii)
         radii = robust_radii(equal, norm(near.offset), near.doubt, n, vertex)
     doubt = np.minimum(near.doubt, _flat_doubt(near, spacing)) if passes and settle else near.doubt
     confidence = (1 - doubt) * near.support / (near.support + HALF_SUPPORT)
     made = dict(vertices=x + centre, confidence=confidence, radii=radii, vertex_of_point=owner)
-    return with_fields(skeleton, **made, half_width=near.width, half_thickness=near.sections.half_thickness)
+    return curve.changed(**made, half_width=near.width, half_thickness=near.sections.half_thickness)
 
 
 def _walked(
@@ -333,8 +333,8 @@ def _solve(x: np.ndarray, near: _Nearest, p: np.ndarray, pattern: _Pattern, sett
 class _Pattern:
     """Where the blocks of `_solve` stand in its system: for both ends of edges, vertices, and these with two beside."""
 
-    def __init__(self, skeleton: Skeleton, edges_at: np.ndarray) -> None:
-        m, self.ends, self.inner = len(skeleton.vertices), skeleton.edges, np.flatnonzero(skeleton.degree == 2)
+    def __init__(self, curve: Curve, edges_at: np.ndarray) -> None:
+        m, self.ends, self.inner = len(curve.vertices), curve.edges, np.flatnonzero(curve.degree == 2)
         # the other end of either edge
         self.beside = self.ends[edges_at[self.inner, :2]].sum(axis=2) - self.inner[:, None]
         (a, b), every, stencil = self.ends.T, np.arange(m), np.column_stack([self.inner, self.beside])

@@ -6,46 +6,46 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...data.skeleton import Skeleton
+from ...data.graph import Graph
 from ...geometry.groups import Members, group_median, group_sum
 from ...geometry.vectors import COLUMNS, FULL, ROWS, Floats, Ints, dot, norm, unit
 
 
 @dataclass(frozen=True, eq=False)
 class VertexPoints:
-    """The points that support a skeleton: those that have a vertex and a normal."""
+    """The points that support a curve: those that have a vertex and a normal."""
 
-    skeleton: Skeleton
+    graph: Graph
 
     @cached_property
     def rows(self) -> Ints:
         """Which input points they are, (n,) int array."""
-        return self.skeleton.supporting_points
+        return self.graph.supporting_points
 
     @cached_property
     def points(self) -> np.ndarray:
         """Where they are, (n, 3) float array."""
-        return self.skeleton.points.take(self.rows, axis=0)
+        return self.graph.points.take(self.rows, axis=0)
 
     @cached_property
     def normals(self) -> np.ndarray:
         """The normal of each, (n, 3) float array."""
-        return self.skeleton.normals.take(self.rows, axis=0)
+        return self.graph.normals.take(self.rows, axis=0)
 
     @cached_property
     def vertex(self) -> np.ndarray:
         """The vertex of each, (n,) int array."""
-        return self.skeleton.vertex_of_point[self.rows]
+        return self.graph.vertex_of_point[self.rows]
 
     @cached_property
     def offset(self) -> np.ndarray:
         """From its vertex to each, (n, 3) float array."""
-        return self.points - self.skeleton.vertices.take(self.vertex, axis=0)
+        return self.points - self.graph.vertices.take(self.vertex, axis=0)
 
     @cached_property
     def count(self) -> Ints:
         """Points of every vertex, (M,) int array."""
-        return np.bincount(self.vertex, minlength=len(self.skeleton.vertices))
+        return np.bincount(self.vertex, minlength=len(self.graph.vertices))
 
     @property
     def mass(self) -> np.ndarray:
@@ -55,12 +55,12 @@ class VertexPoints:
     @cached_property
     def distance(self) -> np.ndarray:
         """Median distance from every vertex to its points, (M,) float array."""
-        return group_median(norm(self.offset), self.vertex, len(self.skeleton.vertices))
+        return group_median(norm(self.offset), self.vertex, len(self.graph.vertices))
 
     @cached_property
     def members(self) -> Members:
         """The points of every vertex, as positions among these."""
-        return Members(self.vertex, len(self.skeleton.vertices))
+        return Members(self.vertex, len(self.graph.vertices))
 
 
 # fitted: radii that a tangent plane passes by the sphere or section that it should touch, where its point counts half
@@ -81,7 +81,7 @@ class Sections(NamedTuple):
         return np.sqrt(self.half_width * self.half_thickness)
 
 
-def measure_sections(skeleton: Skeleton) -> Sections:
+def measure_sections(graph: Graph, cloud: VertexPoints) -> Sections:
     r"""Measure the sections by the tangent planes of the points around every vertex.
 
     With the points p of a vertex and of those beside it, their unit normals n, and the vertex x that each belongs to,
@@ -92,15 +92,14 @@ def measure_sections(skeleton: Skeleton) -> Sections:
     half axes are the largest and the least h(e) across the limb, that is in the plane of the two eigenvectors of N with
     the largest eigenvalues: along the limb normals have the least share. Around a circle, or any part of it, h is the
     radius, and around a rectangle, or two sides of it, they are its half axes, however the points are spread. Vertices
-    without points have the skeleton's radius for both half axes; where only one side was seen, others have it in the
+    without points have the curve's radius for both half axes; where only one side was seen, others have it in the
     direction that nobody knows.
     """
-    cloud = VertexPoints(skeleton)
-    m, (a, b) = len(skeleton.vertices), skeleton.edges.T
+    m, (a, b) = len(graph.vertices), graph.edges.T
     sums = group_sum(normal_moments(cloud.normals, cloud.offset), cloud.vertex, m)
     sums = sums + group_sum(sums[np.concatenate([b, a])], np.concatenate([a, b]), m)
-    found = half_axes(sums, skeleton.radii)
-    wide, thick = (np.where(cloud.count == 0, skeleton.radii, half) for half in found[:2])
+    found = half_axes(sums, graph.radii)
+    wide, thick = (np.where(cloud.count == 0, graph.radii, half) for half in found[:2])
     return Sections(wide, thick, found.across)
 
 

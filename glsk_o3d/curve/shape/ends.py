@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...data.skeleton import NOT_MEASURED, Skeleton
+from ..curve import Curve
 from ...geometry.groups import Members, quantile
 from ...geometry.neighbourhoods import plane_axes
 from ...geometry.polylines import arc_lengths, place_at
@@ -38,7 +38,7 @@ ROUND_VARIANCE = 2 / 75  # derived: its variance,
 ROUND_AREA = 1 / 2  # derived: and the weight over that of a flat cap
 
 
-def regrow_ends(skeleton: Skeleton, to_surface: bool = False) -> Skeleton:
+def regrow_ends(curve: Curve, to_surface: bool = False) -> Curve:
     r"""Cut every end where a cap may have bent it, and let it grow along its limb to where this stops.
 
     Contraction draws the end of a limb into an edge or a corner of the face that closes it, and the fit follows, since
@@ -58,11 +58,11 @@ def regrow_ends(skeleton: Skeleton, to_surface: bool = False) -> Skeleton:
     New vertices come behind all others, with the confidence of the run behind and the radii of their own sections.
     Points of a vertex that was cut belong to the nearest one of the same end. Loops and vertices without edges stay.
     """
-    if not len(skeleton.leaves):
-        return skeleton
-    cloud, sections = VertexPoints(skeleton), measure_sections(skeleton)
+    if not len(curve.leaves):
+        return curve
+    cloud, sections = curve.cloud, curve.sections
     grown = [found for end in _ends(cloud) if (found := _grow(cloud, sections, *end, to_surface))]
-    return _replanted(skeleton, grown) if grown else skeleton
+    return _replanted(curve, grown) if grown else curve
 
 
 class _Grown(NamedTuple):
@@ -80,15 +80,15 @@ def _ends(cloud: VertexPoints) -> Iterator[tuple[np.ndarray, int, bool]]:
     The vertex in the middle of a branch with two ends stays. Of another the first vertex out of the part that it grows
     from stays, which says where it leads; one that does not leave that part is none of them.
     """
-    skeleton = cloud.skeleton
-    for branch in skeleton.branches:
-        leaf, along = skeleton.degree[branch[[0, -1]]] == 1, arc_lengths(skeleton.vertices[branch])
+    curve = cloud.curve
+    for branch in curve.branches:
+        leaf, along = curve.degree[branch[[0, -1]]] == 1, arc_lengths(curve.vertices[branch])
         if not along[-1] > 0 or (leaf.all() and len(branch) < 3):
             continue
         middle = 1 + np.argmin(np.abs(along[1:-1] - along[-1] / 2)) if leaf.all() else 0
         for path, ends, stays in ((branch[::-1], leaf[0], len(branch) - 1 - middle), (branch, leaf[1], middle)):
             if ends and not leaf.all():
-                away = norm(skeleton.vertices[path] - skeleton.vertices[path[0]])
+                away = norm(curve.vertices[path] - curve.vertices[path[0]])
                 stays = np.flatnonzero(away <= cloud.distance[path[0]])[-1] + 1
             if ends and stays < len(path):
                 yield path, int(stays + 1), bool(leaf.all())
@@ -98,7 +98,7 @@ def _grow(
     cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int, other: bool, to_surface: bool
 ) -> _Grown | None:
     """Cut the end of a path, and let it grow anew; None if too few points say where."""
-    places, radii, half_widths = cloud.skeleton.vertices[path], sections.radius[path], sections.half_width[path]
+    places, radii, half_widths = cloud.curve.vertices[path], sections.radius[path], sections.half_width[path]
     along = arc_lengths(places)
     last = _last(cloud, path, along, first, other)
     length = along[last]
@@ -305,13 +305,13 @@ def _turn_and_bend(
     return found.reshape(2, 2) @ frame
 
 
-def _replanted(skeleton: Skeleton, grown: list[_Grown]) -> Skeleton:
+def _replanted(curve: Curve, grown: list[_Grown]) -> Curve:
     """With new ends instead of those that were cut."""
-    m = len(skeleton.vertices)
-    members = Members(skeleton.vertex_of_point, m)  # those without a normal, too
-    keep, owner = np.ones(m, bool), skeleton.vertex_of_point.copy()
-    low, high = axis_box(skeleton.points[skeleton.supporting_points])
-    edges, known = [skeleton.edges], {name: [getattr(skeleton, name)] for name in ("radii", "confidence")}
+    m = len(curve.vertices)
+    members = Members(curve.vertex_of_point, m)  # those without a normal, too
+    keep, owner = np.ones(m, bool), curve.vertex_of_point.copy()
+    low, high = axis_box(curve.points[curve.supporting_points])
+    edges, known = [curve.edges], {name: [getattr(curve, name)] for name in ("radii", "confidence")}
     planted = [np.clip(found.places, low, high) for found in grown]
     for (path, cut, _, run), places in zip(grown, planted, strict=True):
         gone, names = path[cut:], m + np.arange(len(places))
@@ -322,16 +322,16 @@ def _replanted(skeleton: Skeleton, grown: list[_Grown]) -> Skeleton:
         for values in known.values():
             values.append(np.full(len(places), quantile(values[0][run])))
         lost = members.of(gone)
-        near = cKDTree(np.concatenate([skeleton.vertices[chain[:1]], places])).query(skeleton.points[lost])[1]
+        near = cKDTree(np.concatenate([curve.vertices[chain[:1]], places])).query(curve.points[lost])[1]
         owner[lost] = chain[near]
     keep = np.concatenate([keep, np.ones(m - len(keep), bool)])
     number, links = np.cumsum(keep) - 1, np.concatenate(edges)
     links = number[links[keep[links].all(axis=1)]]
-    known["vertices"] = [skeleton.vertices, *planted]
+    known["vertices"] = [curve.vertices, *planted]
     made = {name: np.concatenate(values)[keep] for name, values in known.items()}
     made |= dict(edges=links, vertex_of_point=np.append(number, -1)[owner])
-    replanted = replace(skeleton, **NOT_MEASURED | made)
+    replanted = curve.changed(**NOT_MEASURED | made)
     section = measure_sections(replanted).radius
-    new = np.flatnonzero(keep) >= len(skeleton.vertices)
+    new = np.flatnonzero(keep) >= len(curve.vertices)
     # without points a vertex has no section, and keeps the radius of the run
     return with_fields(replanted, radii=np.where(new & (section > 0), section, replanted.radii))

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...data.skeleton import Skeleton
+from ..curve import Curve
 from ...geometry.cycles import edges_on_cycles
 from ...geometry.groups import quantile
 from ...geometry.polylines import arc_lengths
@@ -34,10 +34,10 @@ class Body(NamedTuple):
 
 
 class Handles:
-    """The handles of a skeleton with points: thin parts of loops, each next to a body at least three times as wide."""
+    """The handles of a curve with points: thin parts of loops, each next to a body at least three times as wide."""
 
-    def __init__(self, skeleton: Skeleton) -> None:
-        self.skeleton, self.cloud, self._sections = skeleton, VertexPoints(skeleton), measure_sections(skeleton)
+    def __init__(self, curve: Curve) -> None:
+        self.curve, self.cloud, self._sections = curve, curve.cloud, curve.sections
         self._width, self._tree = half_widths(self.cloud, self._sections), cKDTree(self.cloud.points)
 
     @cached_property
@@ -47,8 +47,8 @@ class Handles:
         Such a body is the widest part of a branch, between two thin ones that are near each other.
         """
         found: list[int] = []
-        vertices, degree = self.skeleton.vertices, self.skeleton.degree
-        for branch in self.skeleton.branches:
+        vertices, degree = self.curve.vertices, self.curve.degree
+        for branch in self.curve.branches:
             if degree[branch[0]] == 2:  # a ring begins anywhere, but not in a body
                 ring = branch[:-1]
                 thinnest = int(np.argmin(np.where(self.cloud.count[ring] > 0, self._width[ring], np.inf)))
@@ -74,7 +74,7 @@ class Handles:
 
         Without points, its middle is the beginning.
         """
-        vertices, parts = self.skeleton.vertices, []
+        vertices, parts = self.curve.vertices, []
         for path in [*paths, *(path[::-1] for path in paths if path[0] == path[-1])]:
             inside = norm(vertices[path] - vertices[path[0]]) <= 2 * self._width[path]
             parts.append(path[np.logical_and.accumulate(inside)])
@@ -88,7 +88,7 @@ class Handles:
     @cached_property
     def _looped(self) -> set[tuple[int, int]]:
         """The edges of loops, in both directions."""
-        edges = self.skeleton.edges
+        edges = self.curve.edges
         looped = edges_on_cycles(len(self._width), edges)
         return {(a, b) for i, j in edges[looped].tolist() for a, b in ((i, j), (j, i))}
 
@@ -101,7 +101,7 @@ class Handles:
 
         If it does not come to the wall, it is followed from farther away.
         """
-        places, cloud = self.skeleton.vertices[path], self.cloud
+        places, cloud = self.curve.vertices[path], self.cloud
         thin = (WIDE_NECK * self._width[path] <= body.half_width) & (cloud.count[path] > 0)
         run = np.flatnonzero(thin)
         if len(run):  # the first of several

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from ...data.skeleton import Skeleton
+from ..curve import Curve
 from ...geometry.polylines import arc_lengths, place_at, relative_distance
 from ...geometry.vectors import TINY, dot
 from ..axis.fit import FIT_STAY, axis_box
@@ -33,7 +33,7 @@ class _Place(NamedTuple):
     lines: list[Line]  # of its limbs, as in `Limbs.at`
 
 
-def move_junctions(skeleton: Skeleton) -> Skeleton:
+def move_junctions(curve: Curve) -> Curve:
     """Move junctions to where their limbs meet, merge those within one radius, and make the limbs straight from there.
 
     The contraction draws limbs together before they meet: the junction of a sharp corner lies inside it, limbs that
@@ -47,29 +47,29 @@ def move_junctions(skeleton: Skeleton) -> Skeleton:
     points, that is the junction's place. In a body without a junction, the vertex nearest to its middle takes that
     part. Points there belong to the vertex to which they are nearest, less its radius.
     """
-    if not len(skeleton.junctions) and not skeleton.n_loops:
-        return skeleton
+    if not len(curve.junctions) and not curve.n_loops:
+        return curve
     known = dict[bytes, _Place]()
     while True:
-        limbs = Limbs(skeleton)
-        places = _places(skeleton, limbs, known)
-        merged = _merged(skeleton, limbs, places)
+        limbs = Limbs(curve)
+        places = _places(curve, limbs, known)
+        merged = _merged(curve, limbs, places)
         if merged is None:
             break
-        skeleton = merged
-    if skeleton.n_loops and len(skeleton.supporting_points):
-        handles = Handles(skeleton)
-        limbs = Limbs(skeleton, handles.bodies)
-        places = _places(skeleton, limbs, known, handles)
-    return _straightened(skeleton, limbs, places)
+        curve = merged
+    if curve.n_loops and len(curve.supporting_points):
+        handles = Handles(curve)
+        limbs = Limbs(curve, handles.bodies)
+        places = _places(curve, limbs, known, handles)
+    return _straightened(curve, limbs, places)
 
 
 def _places(
-    skeleton: Skeleton, limbs: Limbs, known: dict[bytes, _Place], handles: Handles | None = None
+    curve: Curve, limbs: Limbs, known: dict[bytes, _Place], handles: Handles | None = None
 ) -> dict[int, _Place]:
     """Where every junction belongs, if that is not known of the same limbs from before others were merged."""
-    cloud = handles.cloud if handles else VertexPoints(skeleton)
-    low, high = axis_box(cloud.points if len(cloud.points) else skeleton.vertices)
+    cloud = handles.cloud if handles else curve.cloud
+    low, high = axis_box(cloud.points if len(cloud.points) else curve.vertices)
     found = {}
     for junction in sorted(limbs.at):
         name, here = limbs.signature(junction), limbs.at[junction]
@@ -92,7 +92,7 @@ def _places(
         if len(lines) == 2 and followed < 2:  # no junction, but in a body of which a handle is not known
             continue
         own = cloud.members.of(np.unique(np.concatenate(around)))
-        place, touching = meet(lines, skeleton.vertices[junction], radius, cloud.points[own], cloud.normals[own])
+        place, touching = meet(lines, curve.vertices[junction], radius, cloud.points[own], cloud.normals[own])
         if body and followed > 1:  # their lines pass each other
             near = np.linalg.norm(place - body.middle) < body.half_width / 2
             place = place if len(lines) > 2 and near else body.middle
@@ -106,7 +106,7 @@ def _places(
     return found
 
 
-def _merged(skeleton: Skeleton, limbs: Limbs, places: dict[int, _Place]) -> Skeleton | None:
+def _merged(curve: Curve, limbs: Limbs, places: dict[int, _Place]) -> Curve | None:
     """Merge pairs of junctions, each the other's nearest, that a branch joins and a radius parts; None if none are."""
     ends = [tuple(sorted(branch[[0, -1]].tolist())) for branch in limbs.branches]
     near: dict[int, tuple[float, int]] = {}
@@ -119,32 +119,32 @@ def _merged(skeleton: Skeleton, limbs: Limbs, places: dict[int, _Place]) -> Skel
     pairs = [k for k in {k for _, k in near.values()} if all(near[v][1] == k for v in ends[k])]
     if not pairs:
         return None
-    group, vertices, radii = np.arange(len(skeleton.vertices)), skeleton.vertices.copy(), skeleton.radii.copy()
+    group, vertices, radii = np.arange(len(curve.vertices)), curve.vertices.copy(), curve.radii.copy()
     for k in pairs:
         stays = ends[k][0]
         group[limbs.branches[k]] = stays
         vertices[stays] = np.mean([places[v].place for v in ends[k]], axis=0)
         radii[stays] = radii[list(ends[k])].max()
-    merged = merge_into(replace(skeleton, vertices=vertices, radii=radii), group)
-    return merged if merged.n_loops == skeleton.n_loops else None
+    merged = merge_into(curve.changed(vertices=vertices, radii=radii), group)
+    return merged if merged.n_loops == curve.n_loops else None
 
 
-def _straightened(skeleton: Skeleton, limbs: Limbs, places: dict[int, _Place]) -> Skeleton:
+def _straightened(curve: Curve, limbs: Limbs, places: dict[int, _Place]) -> Curve:
     """Put junctions in their places, and the disturbed parts of limbs on straight lines from there."""
-    vertices, radii = skeleton.vertices.copy(), skeleton.radii.copy()
-    confidence, owner = skeleton.confidence.copy(), skeleton.vertex_of_point.copy()
+    vertices, radii = curve.vertices.copy(), curve.radii.copy()
+    confidence, owner = curve.confidence.copy(), curve.vertex_of_point.copy()
     for junction, (place, _, lines) in places.items():
         vertices[junction] = place
         radii[junction], entering = 0, list[np.ndarray]()
         for limb, line in zip(limbs.at[junction], lines, strict=True):
             path = limbs.paths[limb]
-            along = arc_lengths(skeleton.vertices[path])
+            along = arc_lengths(curve.vertices[path])
             start, lead = line.start, line.lead
             # the place lies ahead of where the limb is joined: it would turn back
             if len(lead) == 1 and (lead[0] - place) @ line.way > 0:
-                ahead = np.flatnonzero((along > start) & ((skeleton.vertices[path] - place) @ line.way < 0))
+                ahead = np.flatnonzero((along > start) & ((curve.vertices[path] - place) @ line.way < 0))
                 if len(ahead):
-                    start, lead = along[ahead[0]], skeleton.vertices[path[ahead[:1]]]
+                    start, lead = along[ahead[0]], curve.vertices[path[ahead[:1]]]
             moved = np.flatnonzero((along > 0) & (along < start))
             lead = np.concatenate([[place], lead])
             lengths = arc_lengths(lead)
@@ -153,24 +153,24 @@ def _straightened(skeleton: Skeleton, limbs: Limbs, places: dict[int, _Place]) -
                 there[np.abs(there - lengths[2]).argmin()] = lengths[2]
             vertices[path[moved]] = place_at(lead, lengths, there)
             # a junction owns points of everything around: what it measured itself does not count
-            radius = np.interp(start, along, skeleton.radii[path])
+            radius = np.interp(start, along, curve.radii[path])
             radii[path[moved]] = radius
             if len(lead) > 2:  # but what a body measured does
-                inside, radius = path[moved[there < lengths[1]]], skeleton.radii[junction]
-                confidence[path[moved]] = np.interp(start, along, skeleton.confidence[path])
-                radii[inside], confidence[inside] = radius, skeleton.confidence[junction]
+                inside, radius = path[moved[there < lengths[1]]], curve.radii[junction]
+                confidence[path[moved]] = np.interp(start, along, curve.confidence[path])
+                radii[inside], confidence[inside] = radius, curve.confidence[junction]
                 entering.append(path[moved])
             radii[junction] = max(radii[junction], radius)
         if entering:
             chain = np.concatenate([[junction], *entering])
             own = np.flatnonzero(np.isin(owner, chain))
-            away = cdist(skeleton.points[own], vertices[chain]) - radii[chain]
+            away = cdist(curve.points[own], vertices[chain]) - radii[chain]
             owner[own] = chain[away.argmin(axis=1)]
-    moved = with_fields(skeleton, vertices=vertices, radii=radii, confidence=confidence, vertex_of_point=owner)
-    return with_gaps(moved, _through_air(skeleton, places))
+    moved = curve.changed(vertices=vertices, radii=radii, confidence=confidence, vertex_of_point=owner)
+    return moved.with_gaps(_through_air(curve, places))
 
 
-def _through_air(skeleton: Skeleton, places: dict[int, _Place]) -> np.ndarray:
+def _through_air(curve: Curve, places: dict[int, _Place]) -> np.ndarray:
     """Ends of the ways from junctions to their limbs that no point is beside, (g, 2, 3): those of handles in a bowl.
 
     There, none is within two radii of the thickest limb.
@@ -179,7 +179,7 @@ def _through_air(skeleton: Skeleton, places: dict[int, _Place]) -> np.ndarray:
         return np.empty((0, 2, 3))
     ends = np.array([(it.place, line.lead[:2][-1]) for it in places.values() for line in it.lines]).reshape(-1, 2, 3)
     thickest = [max(line.radius for line in it.lines) for it in places.values() for _ in it.lines]
-    away = cKDTree(skeleton.points[skeleton.vertex_of_point >= 0]).query(ends.mean(axis=1))[0]
+    away = cKDTree(curve.points[curve.vertex_of_point >= 0]).query(ends.mean(axis=1))[0]
     return ends[np.isfinite(away) & (away > AXIS_LENGTH * np.array(thickest))]
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
-from ...data.skeleton import Skeleton
+from ..curve import Curve
 from ...geometry.groups import group_sum
 from ...geometry.near_links import linked
 from ...geometry.neighbourhoods import nearest_neighbours
@@ -18,20 +18,20 @@ from ..topology.evidence import SurfaceGraph
 WIDE_NECK = 3.0
 
 
-def level_wide_ends(skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
+def level_wide_ends(curve: Curve, surface: SurfaceGraph) -> Curve:
     """Move the vertices of wide ends to the means of bands of the surface that are equally far from the neck.
 
     A disc has no axis: every way through it is in the middle of its own sections, so that a fit leaves it as it is. Nor
     is the way ahead told by the limb, which meets a pan at an angle. The bands know the way from the neck to the rim,
     and their means hardly depend on the points. Balls on a neck are wide ends, too.
     """
-    width = half_widths(VertexPoints(skeleton), measure_sections(skeleton))
-    leaf = skeleton.degree == 1
-    for branch in skeleton.branches:
+    width = half_widths(curve.cloud, curve.sections)
+    leaf = curve.degree == 1
+    for branch in curve.branches:
         for path in (branch, branch[::-1]):
-            if leaf[path[-1]] and len(run := _wide_end(path, skeleton.vertices, width, bool(leaf[path[0]]))):
-                skeleton = _levelled(skeleton, run, surface)
-    return skeleton
+            if leaf[path[-1]] and len(run := _wide_end(path, curve.vertices, width, bool(leaf[path[0]]))):
+                curve = _levelled(curve, run, surface)
+    return curve
 
 
 def half_widths(cloud: VertexPoints, sections: Sections) -> np.ndarray:
@@ -39,7 +39,7 @@ def half_widths(cloud: VertexPoints, sections: Sections) -> np.ndarray:
 
     Where normals mean nothing, as on scan lines, points are farther away than the half width.
     """
-    away, (a, b) = cloud.distance, cloud.skeleton.edges.T
+    away, (a, b) = cloud.distance, cloud.curve.edges.T
     width = np.fmax(sections.half_width, away)
     np.maximum.at(width, np.concatenate([a, b]), away[np.concatenate([b, a])])
     return width
@@ -64,27 +64,27 @@ def _wide_end(path: np.ndarray, vertices: np.ndarray, width: np.ndarray, other: 
     return path[neck:] if len(path) - neck > 3 else path[:0]
 
 
-def _levelled(skeleton: Skeleton, run: np.ndarray, surface: SurfaceGraph) -> Skeleton:
-    """The skeleton with a run, whose first two vertices are the neck and stay, at the means of bands behind it."""
-    vertex, k = skeleton.vertex_of_point[surface.supporting], surface.neighbours.shape[1]
+def _levelled(curve: Curve, run: np.ndarray, surface: SurfaceGraph) -> Curve:
+    """The curve with a run, whose first two vertices are the neck and stay, at the means of bands behind it."""
+    vertex, k = curve.vertex_of_point[surface.supporting], surface.neighbours.shape[1]
     rows = np.flatnonzero(np.isin(vertex, run))
     neck = np.flatnonzero(np.isin(vertex[rows], run[:2]))
     if not len(neck):
-        return skeleton
+        return curve
     index = np.full(len(vertex), -1)
     index[rows] = np.arange(len(rows))
     pairs = np.column_stack([np.repeat(np.arange(len(rows)), k), index[surface.neighbours[rows]].ravel()])
     away = dijkstra(linked(surface.points[rows], pairs[pairs[:, 1] >= 0]), indices=neck, min_only=True)
     reached, n = np.isfinite(away), len(run) - 2
     if reached.mean() < MAJORITY:  # a bridge joins them, and no surface
-        return skeleton
+        return curve
     away, points = away[reached], surface.points[rows[reached]]
     band = np.minimum((n * away / max(away.max(), TINY)).astype(int), n - 1)
     count = np.bincount(band, minlength=n)
     mean = group_sum(points, band, n) / np.maximum(count, 1)[:, None]
     some = np.flatnonzero(count)
-    vertices, owner = skeleton.vertices.copy(), skeleton.vertex_of_point.copy()
+    vertices, owner = curve.vertices.copy(), curve.vertex_of_point.copy()
     vertices[run[2:]] = np.column_stack([np.interp(np.arange(n), some, column) for column in mean[some].T])
     owned = np.flatnonzero(np.isin(owner, run[2:]))
-    owner[owned] = run[2 + band[nearest_neighbours(points, 1, of=skeleton.points[owned])[1][:, 0]]]
-    return with_fields(skeleton, vertices=vertices, vertex_of_point=owner)
+    owner[owned] = run[2 + band[nearest_neighbours(points, 1, of=curve.points[owned])[1][:, 0]]]
+    return curve.changed(vertices=vertices, vertex_of_point=owner)

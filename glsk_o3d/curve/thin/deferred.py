@@ -1,4 +1,4 @@
-"""Set parts without a surface aside while a skeleton is refined by the surface around it."""
+"""Set parts without a surface aside while a curve is refined by the surface around it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...data.skeleton import OF_VERTICES, Skeleton
+from ..curve import Curve
 from ...geometry.near_links import spanning
 from ...geometry.vectors import norm
 from ..diagnostics import MAJORITY
@@ -18,31 +18,31 @@ from .detect import REGION_VERTICES, UNSURE_CONFIDENCE, SpacedPoints, mostly_on_
 
 
 class Aside(NamedTuple):
-    """What of a skeleton was set aside."""
+    """What of a curve was set aside."""
 
-    whole: Skeleton
+    whole: Curve
     gone: np.ndarray  # (M,) bool, its vertices without a surface
     rows: np.ndarray  # input points of the others
 
     @classmethod
-    def of(cls, skeleton: Skeleton, least: float) -> Aside | None:
-        """The parts that a Tracer will trace, if they have most points of a large skeleton, such as a tree's crown.
+    def of(cls, curve: Curve, least: float) -> Aside | None:
+        """The parts that a Tracer will trace, if they have most points of a large curve, such as a tree's crown.
 
         No surface around them says anything, and there are thousands of them to be asked about. `least` is as in
         `without_surface`.
         """
-        cloud, unsure = SpacedPoints(skeleton), skeleton.confidence < UNSURE_CONFIDENCE
-        if len(unsure) <= REGION_VERTICES or not _most(cloud, unsure) or mostly_on_loops(skeleton, unsure):
+        cloud, unsure = SpacedPoints(curve), curve.confidence < UNSURE_CONFIDENCE
+        if len(unsure) <= REGION_VERTICES or not _most(cloud, unsure) or mostly_on_loops(curve, unsure):
             return None
         gone = without_surface(cloud, least)
-        if not _most(cloud, gone) or mostly_on_loops(skeleton, gone):
+        if not _most(cloud, gone) or mostly_on_loops(curve, gone):
             return None
         for _ in range(CROSSING_HOPS):  # what grows where a part was severed is near, and will be traced, too
-            gone[skeleton.edges[~gone[skeleton.edges].all(axis=1)]] = False
-        owner = skeleton.vertex_of_point
-        return cls(skeleton, gone, np.flatnonzero((owner >= 0) & ~gone[owner]))
+            gone[curve.edges[~gone[curve.edges].all(axis=1)]] = False
+        owner = curve.vertex_of_point
+        return cls(curve, gone, np.flatnonzero((owner >= 0) & ~gone[owner]))
 
-    def rest(self) -> Skeleton:
+    def rest(self) -> Curve:
         """What is left, with its points alone."""
         whole, left, rows = self.whole, ~self.gone, self.rows
         number = np.cumsum(left) - 1
@@ -50,7 +50,7 @@ class Aside(NamedTuple):
         made |= dict(vertex_of_point=number[whole.vertex_of_point[rows]], **some_vertices(whole, left))
         return replace(whole, edges=number[whole.edges[left[whole.edges].all(axis=1)]], **made)
 
-    def put_back(self, rest: Skeleton) -> Skeleton:
+    def put_back(self, rest: Curve) -> Curve:
         """The refined rest, and behind its vertices those set aside, as trees tied to where it is nearest."""
         whole, gone, m = self.whole, self.gone, len(rest.vertices)
         number = m - 1 + np.cumsum(gone)

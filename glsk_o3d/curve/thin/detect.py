@@ -7,7 +7,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from ...data.points import RIDGE_NEIGHBOURS, noise_share
-from ...data.skeleton import Skeleton
+from ..curve import Curve
 from ...geometry.cycles import edges_on_cycles
 from ...geometry.eigen import largest_eigenvalue
 from ...geometry.grid_sampling import SAMPLED_POINTS, sample_cloud
@@ -39,7 +39,7 @@ class SpacedPoints(VertexPoints):
     @cached_property
     def rows(self) -> np.ndarray:
         """Which input points they are."""
-        points, some = self.skeleton.points, np.flatnonzero(self.skeleton.vertex_of_point >= 0)
+        points, some = self.curve.points, np.flatnonzero(self.curve.vertex_of_point >= 0)
         if len(some):
             some = some[sample_cloud(points[some], SAMPLED_POINTS)[0]]
         wide = np.ptp(points[some], axis=0).max() if len(some) else 0.0
@@ -72,55 +72,55 @@ def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
     points of a region, it is so. Where the confidence is unknown there is a surface. If more than `least` of all these
     points fill space, they are no twigs, but a part scattered as thick as it is wide, and there are no such vertices.
     """
-    skeleton, m = cloud.skeleton, len(cloud.skeleton.vertices)
-    thin = skeleton.confidence < UNSURE_CONFIDENCE
-    if not may_lack_surface(skeleton, least) or len(cloud.rows) < LEAST_POINTS:
+    curve, m = cloud.curve, len(cloud.curve.vertices)
+    thin = curve.confidence < UNSURE_CONFIDENCE
+    if not may_lack_surface(curve, least) or len(cloud.rows) < LEAST_POINTS:
         return np.zeros(m, bool)
     vertex, count = cloud.vertex, cloud.count
-    _, near = nearest_neighbours(skeleton.vertices, min(REGION_VERTICES, m))
+    _, near = nearest_neighbours(curve.vertices, min(REGION_VERTICES, m))
     if (_share_around(near, count, thin) <= 1 - least).all():
         return np.zeros(m, bool)
     facts = np.column_stack([link_growth(cloud.links), one_direction(cloud.normals, cloud.links)])
     growth, flat = (group_sum(facts, vertex, m) / np.maximum(count, 1)[:, None]).T
     thin &= growth < np.where(flat < SHEET_SHARE, SURFACE_GROWTH, SHEET_GROWTH)
-    thin = (_share_around(near, count, thin) > 1 - least) & ~_surely_with_surface(skeleton)
+    thin = (_share_around(near, count, thin) > 1 - least) & ~_surely_with_surface(curve)
     return thin & (not thin.any() or bool(cloud.scattered[thin[vertex]].mean() <= least))
 
 
-def without_strays(skeleton: Skeleton) -> Skeleton:
+def without_strays(curve: Curve) -> Curve:
     """The same without vertices that nothing is joined to and that have few points: clumps of flying ones, outliers.
 
     They are fewer than `LEAST_POINTS`, and than half of those of the largest component. Some edge must be left.
     """
-    lone, owner, report = skeleton.degree == 0, skeleton.vertex_of_point, skeleton.report
+    lone, owner, report = curve.degree == 0, curve.vertex_of_point, curve.report
     if not lone.any():
-        return skeleton
-    rows = skeleton.supporting_points
-    rows = rows[first_in_their_place(skeleton.points[rows])]
+        return curve
+    rows = curve.supporting_points
+    rows = rows[first_in_their_place(curve.points[rows])]
     count = np.bincount(owner[rows], minlength=len(lone))
-    strays = lone & (count < min(LEAST_POINTS, MAJORITY * np.bincount(skeleton.component_of_vertex, count).max()))
-    if not strays.any() or not len(skeleton.edges):
-        return skeleton
-    gone = np.append(strays, False)[owner] & ~np.isnan(skeleton.normals[:, 0])
-    distinct = len(np.unique(skeleton.points[gone], axis=0))
+    strays = lone & (count < min(LEAST_POINTS, MAJORITY * np.bincount(curve.component_of_vertex, count).max()))
+    if not strays.any() or not len(curve.edges):
+        return curve
+    gone = np.append(strays, False)[owner] & ~np.isnan(curve.normals[:, 0])
+    distinct = len(np.unique(curve.points[gone], axis=0))
     n_outliers, n_distinct = report.n_outliers + int(gone.sum()), report.n_distinct - distinct
     report = replace(report, n_outliers=n_outliers, n_distinct=n_distinct)
-    normals = np.where(gone[:, None], np.nan, skeleton.normals)
-    return drop_vertices(with_fields(skeleton, normals=normals, report=report), strays)
+    normals = np.where(gone[:, None], np.nan, curve.normals)
+    return drop_vertices(curve.changed(normals=normals, report=report), strays)
 
 
-def may_lack_surface(skeleton: Skeleton, least: float) -> bool:
+def may_lack_surface(curve: Curve, least: float) -> bool:
     """Whether vertices that are not sure where the axis is have so many points that one region may lack a surface."""
-    if skeleton.report.n_mixed:  # then a part thinner than a pixel would be nothing but mixed pixels
+    if curve.report.n_mixed:  # then a part thinner than a pixel would be nothing but mixed pixels
         return False
-    owner, m = skeleton.vertex_of_point[skeleton.vertex_of_point >= 0], len(skeleton.vertices)
+    owner, m = curve.vertex_of_point[curve.vertex_of_point >= 0], len(curve.vertices)
     count = np.bincount(owner, minlength=m) / max(len(owner) / SAMPLED_POINTS, 1)
-    return bool(count[skeleton.confidence < UNSURE_CONFIDENCE].sum() > (1 - least) * min(REGION_POINTS, count.sum()))
+    return bool(count[curve.confidence < UNSURE_CONFIDENCE].sum() > (1 - least) * min(REGION_POINTS, count.sum()))
 
 
-def mostly_on_loops(skeleton: Skeleton, thin: np.ndarray) -> bool:
+def mostly_on_loops(curve: Curve, thin: np.ndarray) -> bool:
     """Whether most of some vertices are on loops, as in a frame of thin bars: from its root, paths would open all."""
-    edges = skeleton.edges
+    edges = curve.edges
     looped = edges_on_cycles(len(thin), edges)
     return bool(2 * thin[np.unique(edges[looped])].sum() > thin.sum())
 
@@ -144,11 +144,11 @@ def _share_around(near: np.ndarray, count: np.ndarray, some: np.ndarray) -> np.n
     return (points * some[near]).sum(axis=1) / np.maximum(points.sum(axis=1), 1)
 
 
-def _surely_with_surface(skeleton: Skeleton) -> np.ndarray:
+def _surely_with_surface(curve: Curve) -> np.ndarray:
     """Vertices in stretches that surely have a surface, and are long for their radius."""
-    m, ends, sure = len(skeleton.vertices), skeleton.edges, skeleton.confidence > SURE_CONFIDENCE
+    m, ends, sure = len(curve.vertices), curve.edges, curve.confidence > SURE_CONFIDENCE
     inside = sure[ends].all(axis=1)
     stretch = component_labels(m, ends[inside])
-    length = np.bincount(stretch[ends[inside, 0]], skeleton.edge_lengths[inside], m)
-    radius = np.bincount(stretch, skeleton.radii, m) / np.maximum(np.bincount(stretch, minlength=m), 1)
+    length = np.bincount(stretch[ends[inside, 0]], curve.edge_lengths[inside], m)
+    radius = np.bincount(stretch, curve.radii, m) / np.maximum(np.bincount(stretch, minlength=m), 1)
     return sure & (length > STUB_LENGTH * radius)[stretch]

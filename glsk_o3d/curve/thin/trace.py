@@ -1,4 +1,4 @@
-"""Trace parts without a surface along shortest paths through their points, and make a tree of a skeleton."""
+"""Trace parts without a surface along shortest paths through their points, and make a tree of a curve."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
-from ...data.skeleton import NOT_MEASURED, Skeleton
+from ..curve import Curve
 from ...geometry.groups import component_labels, group_median
 from ...geometry.near_links import LINK_SPACINGS, join_pieces, linked, slice_centres, steps
 from ...geometry.polylines import incident_edges, nearest_on_edges, places_on_edges
@@ -29,7 +29,7 @@ LEAST_PIECE = 3  # smaller groups of points say nothing of a radius, and farther
 MEETING_COSINE = 0.8  # how straight ahead of each other two tips meet that are as near as linked points
 
 
-def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
+def trace(curve: Curve, surface: float, root: str | None) -> Curve:
     """Replace what has no surface by shortest paths through its points; with a root make one tree of everything.
 
     Points are linked with near ones (`near_links`), and with the vertices of parts that have a surface. From a root a
@@ -41,17 +41,17 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
     See `without_surface` for `surface`, 0 for no traced parts, and `Tracer.root` for the root. Without one, nothing
     is traced if most of what would be is on loops.
     """
-    cloud, m = SpacedPoints(skeleton), len(skeleton.vertices)
+    cloud, m = SpacedPoints(curve), len(curve.vertices)
     thin = np.zeros(m, bool)
     if surface and m:
         thin = without_surface(cloud, surface)
-    if m == 0 or (root is None and (not thin.any() or mostly_on_loops(skeleton, thin))):
-        return skeleton
-    mixed, joined = _Mixed.of(skeleton, cloud, thin).joined(anywhere=root is not None)
-    ends = skeleton.leaves[~thin[skeleton.leaves]]
-    roots = mixed.roots() if root is None else np.array([root_among(mixed.places, skeleton, root, ends)])
+    if m == 0 or (root is None and (not thin.any() or mostly_on_loops(curve, thin))):
+        return curve
+    mixed, joined = _Mixed.of(curve, cloud, thin).joined(anywhere=root is not None)
+    ends = curve.leaves[~thin[curve.leaves]]
+    roots = mixed.roots() if root is None else np.array([root_among(mixed.places, curve, root, ends)])
     paths = _Paths(mixed, roots)
-    traced = _assembled(skeleton, mixed, paths, tree=root is not None)
+    traced = _assembled(curve, mixed, paths, tree=root is not None)
     if thin.any():
         kept = None if root is None else paths.index[roots[0]]
         traced, stays = drop_spurious(traced, paths.nodes < mixed.n, COVER_RADII, kept)
@@ -60,8 +60,8 @@ def trace(skeleton: Skeleton, surface: float, root: str | None) -> Skeleton:
     point = paths.nodes[stays] < mixed.n
     if point.any() and len(traced.edges):
         traced = replace(traced, radii=np.where(point, thickness_around(traced), traced.radii))
-    loose = thin[skeleton.vertex_of_point] & (skeleton.vertex_of_point >= 0)
-    traced = with_gaps(traced, mixed.places[joined])
+    loose = thin[curve.vertex_of_point] & (curve.vertex_of_point >= 0)
+    traced = traced.with_gaps(mixed.places[joined])
     report = replace(traced.report, n_traced=int(loose.sum()))
     if root is None:
         traced = without_strays(traced)
@@ -79,12 +79,12 @@ class _Mixed:
     places: np.ndarray
     links: csr_matrix
     edges: np.ndarray  # those between vertices
-    vertices: np.ndarray  # of the skeleton
+    vertices: np.ndarray  # of the curve
     radius: np.ndarray  # of the vertices; 0 of points
     scale: float
 
     @classmethod
-    def of(cls, skeleton: Skeleton, cloud: SpacedPoints, thin: np.ndarray) -> _Mixed:
+    def of(cls, curve: Curve, cloud: SpacedPoints, thin: np.ndarray) -> _Mixed:
         some, scale = np.empty(0, int), 0.0
         if thin.any():
             scale = float(np.median(cloud.away[:, -1]))
@@ -95,15 +95,15 @@ class _Mixed:
         thick, n = np.flatnonzero(~thin), len(some)
         index = np.full(len(thin), -1)
         index[thick] = n + np.arange(len(thick))
-        edges = index[skeleton.edges]
+        edges = index[curve.edges]
         ends = edges = edges[(edges >= 0).all(axis=1)]
         if n:
             node = index[cloud.vertex]
             node[some] = np.arange(n)
             near = node[np.column_stack(cloud.links.nonzero())]
             ends = np.concatenate([edges, near[(near >= 0).all(axis=1) & (near < n).any(axis=1)]])
-        places = np.concatenate([cloud.points[some], skeleton.vertices[thick]])
-        radius = np.concatenate([np.zeros(n), skeleton.radii[thick]])
+        places = np.concatenate([cloud.points[some], curve.vertices[thick]])
+        radius = np.concatenate([np.zeros(n), curve.radii[thick]])
         return cls(n, places, linked(places, ends), edges, thick, radius, scale)
 
     def joined(self, anywhere: bool) -> tuple[_Mixed, np.ndarray]:
@@ -167,8 +167,8 @@ class _Paths:
             self._covered[found] = True
 
 
-def _assembled(skeleton: Skeleton, mixed: _Mixed, paths: _Paths, tree: bool) -> Skeleton:
-    """The paths and what has a surface as one skeleton; points go to the nearest vertex, or stay where theirs stays."""
+def _assembled(curve: Curve, mixed: _Mixed, paths: _Paths, tree: bool) -> Curve:
+    """The paths and what has a surface as one curve; points go to the nearest vertex, or stay where theirs stays."""
     nodes, edges = paths.nodes, mixed.edges
     if tree:  # of a loop its longest edge goes
         edges = np.column_stack(minimum_spanning_tree(linked(mixed.places, edges)).nonzero())
@@ -178,18 +178,18 @@ def _assembled(skeleton: Skeleton, mixed: _Mixed, paths: _Paths, tree: bool) -> 
     vertices = np.where(inner, paths.centre[nodes], mixed.places[nodes])
     met = np.empty((0, 2), int) if tree else _meetings(vertices, edges, point & (degree == 1), mixed.scale)
     edges = np.concatenate([edges, met])
-    index = np.full(len(skeleton.vertices), -1)
+    index = np.full(len(curve.vertices), -1)
     index[mixed.vertices] = paths.index[mixed.n :]
-    owner = skeleton.vertex_of_point
+    owner = curve.vertex_of_point
     vertex = np.append(index, -1)[owner]
     free = np.flatnonzero((owner >= 0) & (vertex < 0))
-    vertex[free] = cKDTree(vertices).query(skeleton.points[free])[1]
+    vertex[free] = cKDTree(vertices).query(curve.points[free])[1]
     radii, confidence = np.zeros((2, len(nodes)))
     stays = mixed.vertices[nodes[~point] - mixed.n]
-    radii[~point], confidence[~point] = skeleton.radii[stays], skeleton.confidence[stays]
+    radii[~point], confidence[~point] = curve.radii[stays], curve.confidence[stays]
     edges = np.unique(np.sort(edges, axis=1), axis=0)
     made = dict(vertices=vertices, edges=edges, radii=radii, confidence=confidence, vertex_of_point=vertex)
-    traced = with_gaps(replace(skeleton, **NOT_MEASURED | made), vertices[met])
+    traced = with_gaps(curve.changed(**NOT_MEASURED | made), vertices[met])
     if point.any() and len(edges):
         traced = replace(traced, radii=np.where(point, spread_around(traced), radii))
     return traced
@@ -210,46 +210,46 @@ def _meetings(vertices: np.ndarray, edges: np.ndarray, tips: np.ndarray, scale: 
     return tips[found].reshape(-1, 2)
 
 
-def spread_around(skeleton: Skeleton) -> np.ndarray:
+def spread_around(curve: Curve) -> np.ndarray:
     """Median distance from the curve to the points around every vertex and its neighbours, (M,) float array.
 
     Of points on a tube its radius, and outliers have little say.
     """
-    return group_median(*_distances(skeleton), len(skeleton.vertices))
+    return group_median(*_distances(curve), len(curve.vertices))
 
 
-def thickness_around(skeleton: Skeleton) -> np.ndarray:
+def thickness_around(curve: Curve) -> np.ndarray:
     """The same of points that the curve does not run through; where they are too few, that of the nearest with more.
 
     Their median is the radius of a part whose vertices are some of its points.
     """
-    away, vertex = _distances(skeleton)
-    off = away > SAME_PLACE * np.ptp(skeleton.vertices, axis=0).max()
-    thickness = group_median(away[off], vertex[off], len(skeleton.vertices))
+    away, vertex = _distances(curve)
+    off = away > SAME_PLACE * np.ptp(curve.vertices, axis=0).max()
+    thickness = group_median(away[off], vertex[off], len(curve.vertices))
     known = np.flatnonzero(np.bincount(vertex[off], minlength=len(thickness)) >= LEAST_PIECE)
     if not len(known):  # a line
         return thickness
-    links = linked(skeleton.vertices, skeleton.edges)
+    links = linked(curve.vertices, curve.edges)
     nearest = dijkstra(links, indices=known, return_predecessors=True, min_only=True)[2]
     reached = nearest >= 0
     thickness[reached] = thickness[nearest[reached]]
     return thickness
 
 
-def _distances(skeleton: Skeleton) -> tuple[np.ndarray, np.ndarray]:
+def _distances(curve: Curve) -> tuple[np.ndarray, np.ndarray]:
     """How far points are from the curve, and each time the vertex, for that of a point and those beside it."""
-    m, edges = len(skeleton.vertices), skeleton.edges
-    some = np.flatnonzero(skeleton.vertex_of_point >= 0)
-    vertex, points = skeleton.vertex_of_point[some], skeleton.points[some]
-    edge, t = nearest_on_edges(skeleton.vertices, edges, incident_edges(edges, m)[vertex], points)
-    away = norm(points - places_on_edges(skeleton.vertices, edges, edge, t))
-    around = steps(linked(skeleton.vertices, edges))[vertex]
+    m, edges = len(curve.vertices), curve.edges
+    some = np.flatnonzero(curve.vertex_of_point >= 0)
+    vertex, points = curve.vertex_of_point[some], curve.points[some]
+    edge, t = nearest_on_edges(curve.vertices, edges, incident_edges(edges, m)[vertex], points)
+    away = norm(points - places_on_edges(curve.vertices, edges, edge, t))
+    around = steps(linked(curve.vertices, edges))[vertex]
     return np.repeat(away, np.diff(around.indptr)), around.indices
 
 
 def drop_spurious(
-    skeleton: Skeleton, traced: np.ndarray, radii: float, root: int | None = None
-) -> tuple[Skeleton, np.ndarray]:
+    curve: Curve, traced: np.ndarray, radii: float, root: int | None = None
+) -> tuple[Curve, np.ndarray]:
     """Drop twigs whose tip is as near to the rest as points scatter there; say which vertices stay, in their order.
 
     Of N points that scatter normally around a curve, with a median distance of r, one is expected to be farther off
@@ -257,36 +257,36 @@ def drop_spurious(
     dropped, and not the vertex `root`. From a part that has a surface a tip must be `radii` of its radii away. Points
     of a twig belong to the vertex that it grew from.
     """
-    stays = np.arange(len(skeleton.vertices))
-    scatter = math.sqrt(math.log2(max(int((skeleton.vertex_of_point >= 0).sum()), 1)))
+    stays = np.arange(len(curve.vertices))
+    scatter = math.sqrt(math.log2(max(int((curve.vertex_of_point >= 0).sum()), 1)))
     while True:
-        twigs = _twigs(skeleton, traced, root)
+        twigs = _twigs(curve, traced, root)
         if not twigs:
-            return skeleton, stays
+            return curve, stays
         forks, tips = np.array([path[[0, -1]] for path in twigs]).T
         body = np.concatenate([path[1:] for path in twigs])
         twig = np.repeat(np.arange(len(tips)), [len(path) - 1 for path in twigs])
         rest = np.delete(np.arange(len(traced)), body)
-        away, nearest = cKDTree(skeleton.vertices[rest]).query(skeleton.vertices[tips])
+        away, nearest = cKDTree(curve.vertices[rest]).query(curve.vertices[tips])
         beside = rest[nearest]
-        beyond = away - np.where(traced[beside], scatter, radii) * skeleton.radii[beside]
+        beyond = away - np.where(traced[beside], scatter, radii) * curve.radii[beside]
         order = np.argsort(beyond)
         # of each fork the least, since the others may be what is left of the limb
         order = order[np.unique(forks[order], return_index=True)[1]]
         chosen = order[beyond[order] < 0]
         if not len(chosen):
-            return skeleton, stays
+            return curve, stays
         group, gone = np.arange(len(traced)), np.isin(twig, chosen)
         group[body[gone]] = forks[twig[gone]]
         left = np.unique(group)
         root = None if root is None else int(np.searchsorted(left, root))
-        skeleton, traced, stays = merge_into(skeleton, group), traced[left], stays[left]
-        skeleton = replace(skeleton, radii=np.where(traced, spread_around(skeleton), skeleton.radii))
+        curve, traced, stays = merge_into(curve, group), traced[left], stays[left]
+        curve = curve.changed(radii=np.where(traced, spread_around(curve), curve.radii))
 
 
-def _twigs(skeleton: Skeleton, traced: np.ndarray, root: int | None) -> list[np.ndarray]:
+def _twigs(curve: Curve, traced: np.ndarray, root: int | None) -> list[np.ndarray]:
     """Traced branches that end, as paths from the junctions that they leave, by their tips."""
-    degree, free = skeleton.degree, traced & (np.arange(len(traced)) != (-1 if root is None else root))
-    paths = [branch[::-1] if degree[branch[0]] == 1 else branch for branch in skeleton.branches]
+    degree, free = curve.degree, traced & (np.arange(len(traced)) != (-1 if root is None else root))
+    paths = [branch[::-1] if degree[branch[0]] == 1 else branch for branch in curve.branches]
     found = [path for path in paths if degree[path[0]] > 2 and degree[path[-1]] == 1 and free[path[1:]].all()]
     return sorted(found, key=lambda path: int(path[-1]))

@@ -1,4 +1,4 @@
-"""Merge vertices of a skeleton, and collapse the triangles of a graph, so that it is one-dimensional."""
+"""Merge vertices of a curve, and collapse the triangles of a graph, so that it is one-dimensional."""
 
 import heapq
 import math
@@ -9,27 +9,27 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from ...data.skeleton import ARRAYS, OF_VERTICES, Skeleton
+from ..curve import Curve
 from ...geometry.groups import group_sum
 from ...geometry.pairing import final_representatives
 from ..axis.sections import VertexPoints
 
 
-def some_vertices(skeleton: Skeleton, which: np.ndarray) -> dict[str, Any]:
+def some_vertices(curve: Curve, which: np.ndarray) -> dict[str, Any]:
     """The arrays of some vertices, by name, for `replace`: their places and all that is known of them."""
-    return {name: getattr(skeleton, name)[which] for name in ("vertices", *OF_VERTICES)}
+    return {name: getattr(curve, name)[which] for name in ("vertices", *OF_VERTICES)}
 
 
-def merge_vertices(skeleton: Skeleton, group: np.ndarray) -> Skeleton:
+def merge_vertices(curve: Curve, group: np.ndarray) -> Curve:
     """Make one vertex of each group (M,), at the mean of its members weighted by the points they own.
 
     Groups have any labels. Points of merged vertices belong to the merged one. A vertex alone stays as it is, to the
     last bit, so that what is known of it holds.
     """
     label, group = np.unique(group, return_inverse=True)
-    n, weight = len(label), VertexPoints(skeleton).mass
+    n, weight = len(label), curve.cloud.mass
     total = group_sum(weight, group, n)
-    edges = np.sort(group[skeleton.edges], axis=1)
+    edges = np.sort(group[curve.edges], axis=1)
     alone = np.bincount(group)[group] == 1
 
     def merged(values: np.ndarray) -> Any:
@@ -37,83 +37,83 @@ def merge_vertices(skeleton: Skeleton, group: np.ndarray) -> Skeleton:
         means[group[alone]] = values[alone]
         return means
 
-    known = some_vertices(skeleton, np.arange(len(group)))
+    known = some_vertices(curve, np.arange(len(group)))
     return replace(
-        skeleton,
+        curve,
         **{name: merged(values) for name, values in known.items()},
         edges=np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0),
-        vertex_of_point=np.append(group, -1)[skeleton.vertex_of_point],
+        vertex_of_point=np.append(group, -1)[curve.vertex_of_point],
     )
 
 
-def merge_into(skeleton: Skeleton, into: np.ndarray) -> Skeleton:
+def merge_into(curve: Curve, into: np.ndarray) -> Curve:
     """Merge vertices `into` others (M,), which stay where and what they are, and in their order.
 
     Points of merged vertices belong to the one that stays.
     """
     stay = np.unique(into)
-    return with_fields(merge_vertices(skeleton, into), **some_vertices(skeleton, stay))
+    return with_fields(merge_vertices(curve, into), **some_vertices(curve, stay))
 
 
-def drop_edges(skeleton: Skeleton, gone: ArrayLike) -> Skeleton:
+def drop_edges(curve: Curve, gone: ArrayLike) -> Curve:
     """Drop some edges, each named by its two vertices, the lower first; vertices stay."""
-    dropped = (skeleton.edges[:, None] == np.asarray(gone)).all(axis=2).any(axis=1)
-    return replace(skeleton, edges=skeleton.edges[~dropped])
+    dropped = (curve.edges[:, None] == np.asarray(gone)).all(axis=2).any(axis=1)
+    return curve.changed(edges=curve.edges[~dropped])
 
 
-def drop_vertices(skeleton: Skeleton, lone: np.ndarray) -> Skeleton:
+def drop_vertices(curve: Curve, lone: np.ndarray) -> Curve:
     """Drop `lone` (M,) vertices, without edges, unless there are no others; their points go to the nearest left."""
     left = np.flatnonzero(~lone)
-    if len(left) in (0, len(skeleton.vertices)):
-        return skeleton
-    representative = cKDTree(skeleton.vertices[left]).query(skeleton.vertices)[1]
+    if len(left) in (0, len(curve.vertices)):
+        return curve
+    representative = cKDTree(curve.vertices[left]).query(curve.vertices)[1]
     representative[left] = np.arange(len(left))
     return replace(
-        skeleton,
-        **some_vertices(skeleton, left),
-        edges=representative[skeleton.edges],
-        vertex_of_point=np.append(representative, -1)[skeleton.vertex_of_point],
+        curve,
+        **some_vertices(curve, left),
+        edges=representative[curve.edges],
+        vertex_of_point=np.append(representative, -1)[curve.vertex_of_point],
     )
 
 
-def with_fields(skeleton: Skeleton, **fields: Any) -> Skeleton:
+def with_fields(curve: Curve, **fields: Any) -> Curve:
     """The same graph with other fields than its edges, as by `replace`, but unchecked, and what is known of it kept."""
-    made, known = object.__new__(type(skeleton)), vars(skeleton)
+    made, known = object.__new__(type(curve)), vars(curve)
     names = (*ARRAYS, "report", "degree", "component_of_vertex", "branches")
     vars(made).update({name: known[name] for name in names if name in known} | fields)
     return made
 
 
-def with_gaps(skeleton: Skeleton, ends: np.ndarray) -> Skeleton:
+def with_gaps(curve: Curve, ends: np.ndarray) -> Curve:
     """The same; its report has the ends, (g, 2, 3) float array, of more stretches that no point supports."""
-    joined = (*skeleton.report.joined, *((tuple(a), tuple(b)) for a, b in ends.tolist()))
-    return with_fields(skeleton, report=replace(skeleton.report, joined=joined))
+    joined = (*curve.report.joined, *((tuple(a), tuple(b)) for a, b in ends.tolist()))
+    return curve.changed(report=replace(curve.report, joined=joined))
 
 
-def binary_size(skeleton: Skeleton) -> float:
-    """The power of two next to the extent of a skeleton, so that scaling by it rounds nothing; 1 if it has none."""
-    extent = np.ptp(skeleton.vertices, axis=0).max(initial=0)
+def binary_size(curve: Curve) -> float:
+    """The power of two next to the extent of a curve, so that scaling by it rounds nothing; 1 if it has none."""
+    extent = np.ptp(curve.vertices, axis=0).max(initial=0)
     return float(2.0 ** np.round(np.log2(extent))) if extent > 0 else 1.0
 
 
-def scaled(skeleton: Skeleton, factor: float) -> Skeleton:
+def scaled(curve: Curve, factor: float) -> Curve:
     """The same in another unit of length."""
     lengths = ("vertices", "points", "radii", "half_width", "half_thickness")
-    made = {name: factor * getattr(skeleton, name) for name in lengths}
-    blank = with_fields(skeleton, **made, report=replace(skeleton.report, joined=()))
-    return with_gaps(blank, factor * np.array(skeleton.report.joined))
+    made = {name: factor * getattr(curve, name) for name in lengths}
+    blank = curve.changed(**made, report=replace(curve.report, joined=()))
+    return blank.with_gaps(factor * np.array(curve.report.joined))
 
 
-def collapse_triangles(skeleton: Skeleton, by_degree: bool = False) -> Skeleton:
+def collapse_triangles(curve: Curve, by_degree: bool = False) -> Curve:
     """Merge the two ends of edges that lie on a triangle, the shortest edge first, until there is no triangle.
 
     The published order, least mean degree of the two ends first and length to break ties, is a combinatorial one:
     another sample of the same surface has another, and finer vertices make it worse. Lengths converge with the
     vertices' spacing. Points of merged vertices belong to the vertex they were merged into.
     """
-    position, weight = skeleton.vertices.tolist(), VertexPoints(skeleton).mass.tolist()
+    position, weight = curve.vertices.tolist(), curve.cloud.mass.tolist()
     around: list[set[int]] = [set() for _ in position]
-    for a, b in skeleton.edges.tolist():
+    for a, b in curve.edges.tolist():
         around[a].add(b)
         around[b].add(a)
 
@@ -121,7 +121,7 @@ def collapse_triangles(skeleton: Skeleton, by_degree: bool = False) -> Skeleton:
         degree = (len(around[a]) + len(around[b])) / 2 if by_degree else 0.0
         return degree, math.dist(position[a], position[b]), a, b
 
-    queue = [priced(a, b) for a, b in skeleton.edges.tolist() if not around[a].isdisjoint(around[b])]
+    queue = [priced(a, b) for a, b in curve.edges.tolist() if not around[a].isdisjoint(around[b])]
     heapq.heapify(queue)
     representative = list(range(len(position)))
     while queue:
@@ -154,4 +154,4 @@ def collapse_triangles(skeleton: Skeleton, by_degree: bool = False) -> Skeleton:
         for c, d in changed:
             if not around[c].isdisjoint(around[d]):
                 heapq.heappush(queue, priced(c, d))
-    return merge_vertices(skeleton, final_representatives(np.array(representative, int)))
+    return merge_vertices(curve, final_representatives(np.array(representative, int)))

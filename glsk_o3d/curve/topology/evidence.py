@@ -1,4 +1,4 @@
-"""The surface around a skeleton: how it hangs together, which side is out, and what is inside."""
+"""The surface around a curve: how it hangs together, which side is out, and what is inside."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...data.skeleton import Skeleton
+from ..curve import Curve
 from ...geometry.cycles import inscribed_circle
 from ...geometry.diffusion import Diffusion
 from ...geometry.groups import first_in_their_place, group_rank, quantile
@@ -43,7 +43,7 @@ def ask_once(
 ) -> list[Answer]:
     """The answer for each of some things, of which those with new `names` are asked for together, and then `known`.
 
-    A name is all that the answer hangs on, so that it is the same when other parts of the skeleton have changed.
+    A name is all that the answer hangs on, so that it is the same when other parts of the curve have changed.
     """
     fresh = {name: each for name, each in zip(names, asked, strict=True) if name not in known}
     if fresh:
@@ -53,7 +53,7 @@ def ask_once(
 
 @dataclass(frozen=True, eq=False)
 class SurfaceGraph:
-    """Some of the points that support a skeleton, each linked with those nearest to it.
+    """Some of the points that support a curve, each linked with those nearest to it.
 
     Of many points it takes a regular sample, 4096 or more, and 32 for every vertex: an object of many parts takes more.
     Of points in one place it takes the first.
@@ -64,15 +64,15 @@ class SurfaceGraph:
     neighbours: np.ndarray  # (n, k) nearest points, itself first
 
     @classmethod
-    def of(cls, skeleton: Skeleton) -> SurfaceGraph:
-        """The surface that supports a skeleton."""
-        supporting = skeleton.supporting_points
-        enough = max(ENOUGH_POINTS, VERTEX_POINTS * len(skeleton.vertices))
+    def of(cls, curve: Curve) -> SurfaceGraph:
+        """The surface that supports a curve."""
+        supporting = curve.supporting_points
+        enough = max(ENOUGH_POINTS, VERTEX_POINTS * len(curve.vertices))
         step = max(len(supporting) // enough, 1)
         if step > 1:  # which they are must not depend on points that have no say
-            supporting = np.sort(supporting[morton_order(skeleton.points[supporting])[::step]])
-        supporting = supporting[first_in_their_place(skeleton.points[supporting])]
-        points = skeleton.points[supporting]
+            supporting = np.sort(supporting[morton_order(curve.points[supporting])[::step]])
+        supporting = supporting[first_in_their_place(curve.points[supporting])]
+        points = curve.points[supporting]
         if not len(points):
             return cls(supporting, points, np.empty((0, 1), int))
         return cls(supporting, points, nearest_neighbours(points, min(AREA_NEIGHBOURS + 1, len(points)))[1])
@@ -95,21 +95,21 @@ class SurfaceGraph:
 
 @dataclass(frozen=True, eq=False)
 class Evidence(SurfaceGraph):
-    """The points that support a skeleton, as an oriented surface; it holds while the graph is changed."""
+    """The points that support a curve, as an oriented surface; it holds while the graph is changed."""
 
     normals: np.ndarray  # (n, 3) unit vectors that point outward
-    _said: dict[str, tuple[Skeleton, Any]] = field(default_factory=dict, repr=False)
+    _said: dict[str, tuple[Curve, Any]] = field(default_factory=dict, repr=False)
     _wound: dict[bytes, float] = field(default_factory=dict, repr=False)
     _circles: dict[bytes, tuple[np.ndarray, float]] = field(default_factory=dict, repr=False)
 
     @classmethod
-    def of(cls, skeleton: Skeleton, surface: SurfaceGraph | None = None) -> Evidence:
-        """The evidence for a skeleton that has edges and was fitted to its points, or to their `surface`."""
-        surface = surface or SurfaceGraph.of(skeleton)
+    def of(cls, curve: Curve, surface: SurfaceGraph | None = None) -> Evidence:
+        """The evidence for a curve that has edges and was fitted to its points, or to their `surface`."""
+        surface = surface or SurfaceGraph.of(curve)
         supporting, points, neighbours = surface.supporting, surface.points, surface.neighbours
-        edge, t = _nearest_edges(skeleton, supporting)
-        axis = np.where(edge[:, None] >= 0, places_on_edges(skeleton.vertices, skeleton.edges, edge, t), points)
-        normals = orient_from_axis(points, skeleton.normals[supporting], axis, neighbours)
+        edge, t = _nearest_edges(curve, supporting)
+        axis = np.where(edge[:, None] >= 0, places_on_edges(curve.vertices, curve.edges, edge, t), points)
+        normals = orient_from_axis(points, curve.normals[supporting], axis, neighbours)
         made = cls(supporting, points, neighbours, normals)
         vars(made).update(diffusion=surface.diffusion, areas=surface.areas)  # over the same links
         return made
@@ -131,50 +131,50 @@ class Evidence(SurfaceGraph):
         names = [place.tobytes() for place in vertices]
         return np.array(ask_once(self._wound, names, vertices, lambda fresh: self.winding(np.array(fresh)).tolist()))
 
-    def winding_along(self, skeleton: Skeleton) -> np.ndarray:
+    def winding_along(self, curve: Curve) -> np.ndarray:
         """That at the middle of every edge, (E,) float array."""
-        return self._once("winding", skeleton, lambda: self.winding(skeleton.vertices[skeleton.edges].mean(axis=1)))
+        return self._once("winding", curve, lambda: self.winding(curve.vertices[curve.edges].mean(axis=1)))
 
-    def surface_around(self, skeleton: Skeleton) -> np.ndarray:
+    def surface_around(self, curve: Curve) -> np.ndarray:
         """Area of the surface along every edge, (E,) float array.
 
         Points belong to the nearest of the edges at their vertex, and count by how upright their normals stand on it,
         sin^2: all of a tube of which it is the axis, and nothing of a sheet across it.
         """
-        edge, _ = _nearest_edges(skeleton, self.supporting)
+        edge, _ = _nearest_edges(curve, self.supporting)
         some = np.flatnonzero(edge >= 0)
-        edge, ends = edge[some], skeleton.vertices[skeleton.edges]
-        way = (ends[:, 1] - ends[:, 0]) / np.maximum(skeleton.edge_lengths, TINY)[:, None]
+        edge, ends = edge[some], curve.vertices[curve.edges]
+        way = (ends[:, 1] - ends[:, 0]) / np.maximum(curve.edge_lengths, TINY)[:, None]
         upright = 1 - dot(self.normals[some], way[edge]) ** 2
-        return np.bincount(edge, self.areas[some] * upright, len(skeleton.edges))
+        return np.bincount(edge, self.areas[some] * upright, len(curve.edges))
 
-    def bonds(self, skeleton: Skeleton) -> tuple[np.ndarray, np.ndarray]:
+    def bonds(self, curve: Curve) -> tuple[np.ndarray, np.ndarray]:
         """How far the surface goes on from vertex to vertex: pairs i < j, (B, 2) int array, and weights, (B,).
 
         Every two near points of different vertices count by how far their normals agree and stand upright on the line
         between them, cos^2 times sin^2 times sin^2: not where surfaces of two parts face each other.
         """
-        return self._once("bonds", skeleton, lambda: self._bonds(skeleton))
+        return self._once("bonds", curve, lambda: self._bonds(curve))
 
-    def tubes(self, skeleton: Skeleton, cycles: list[np.ndarray]) -> list[float]:
-        """Median distance of the surface along each of some loops of the skeleton."""
-        surface = self._once("surface", skeleton, lambda: VertexPoints(skeleton).distance)
+    def tubes(self, curve: Curve, cycles: list[np.ndarray]) -> list[float]:
+        """Median distance of the surface along each of some loops of the curve."""
+        surface = self._once("surface", curve, lambda: curve.cloud.distance)
         return [max(quantile(surface[cycle]), TINY) for cycle in cycles]
 
     def circle(self, loop: np.ndarray) -> tuple[np.ndarray, float]:
         """The `inscribed_circle` of a loop, (n, 3): of each it is asked once."""
         return ask_once(self._circles, [loop.tobytes()], [loop], lambda fresh: map(inscribed_circle, fresh))[0]
 
-    def _once(self, what: str, skeleton: Skeleton, ask: Callable[[], Any]) -> Any:
-        """What was said of the same skeleton before, or is now."""
+    def _once(self, what: str, curve: Curve, ask: Callable[[], Any]) -> Any:
+        """What was said of the same curve before, or is now."""
         of, answer = self._said.get(what, (None, None))
-        if of is not skeleton:
+        if of is not curve:
             answer = ask()
-            self._said[what] = skeleton, answer
+            self._said[what] = curve, answer
         return answer
 
-    def _bonds(self, skeleton: Skeleton) -> tuple[np.ndarray, np.ndarray]:
-        vertex, m = skeleton.vertex_of_point[self.supporting], len(skeleton.vertices)
+    def _bonds(self, curve: Curve) -> tuple[np.ndarray, np.ndarray]:
+        vertex, m = curve.vertex_of_point[self.supporting], len(curve.vertices)
         p, q = np.repeat(np.arange(len(vertex)), self.neighbours.shape[1] - 1), self.neighbours[:, 1:].ravel()
         a, b = vertex[p], vertex[q]
         foreign = np.flatnonzero(a != b)
@@ -186,63 +186,63 @@ class Evidence(SurfaceGraph):
         return np.column_stack(np.divmod(keys, m)), np.bincount(which, weight, len(keys))
 
 
-def on_sample(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton) -> Skeleton:
-    """What a step makes of a skeleton with its surface points alone and, where there are many, fewer of them.
+def on_sample(step: Callable[[Curve], Curve], curve: Curve) -> Curve:
+    """What a step makes of a curve with its surface points alone and, where there are many, fewer of them.
 
     Of every vertex there is a regular sample, so that thin parts keep all. The more of the cloud is noise, the more
     points are taken, since their mean is what is known of the surface.
     """
-    rows, m = skeleton.surface_points, len(skeleton.vertices)
+    rows, m = curve.surface_points, len(curve.vertices)
     if not len(rows):
-        return step(skeleton)
-    clean = 1 - skeleton.report.noise
+        return step(curve)
+    clean = 1 - curve.report.noise
     if len(rows) * clean > REFINED_POINTS:
-        rows = rows[morton_order(skeleton.points[rows])]
-        vertex = skeleton.vertex_of_point[rows]
+        rows = rows[morton_order(curve.points[rows])]
+        vertex = curve.vertex_of_point[rows]
         count = np.bincount(vertex, minlength=m)
         most = max(REFINED_POINTS / clean / np.count_nonzero(count), 2 * VERTEX_POINTS)
         every = np.ceil(count / most).astype(int)
         rows = rows[group_rank(vertex, m) % every[vertex] == 0]
-    return on_rows(step, skeleton, rows)
+    return on_rows(step, curve, rows)
 
 
-def on_rows(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton, rows: np.ndarray) -> Skeleton:
-    """What a step makes of a skeleton with some of its input points alone, `rows` (n,), in their order.
+def on_rows(step: Callable[[Curve], Curve], curve: Curve, rows: np.ndarray) -> Curve:
+    """What a step makes of a curve with some of its input points alone, `rows` (n,), in their order.
 
     In the result a point that had a vertex has that of its stand-in, and one that is its own that of the nearest of
     these points.
     """
-    others = skeleton.vertex_of_point >= 0
+    others = curve.vertex_of_point >= 0
     others[rows] = False
     others = np.flatnonzero(others)
-    points, vertex = skeleton.points[rows], skeleton.vertex_of_point[rows]
-    made = step(with_fields(skeleton, points=points, normals=skeleton.normals[rows], vertex_of_point=vertex))
-    owner, normals = np.full(len(skeleton.points), -1), skeleton.normals.copy()
+    points, vertex = curve.points[rows], curve.vertex_of_point[rows]
+    made = step(curve.changed(points=points, normals=curve.normals[rows], vertex_of_point=vertex))
+    owner, normals = np.full(len(curve.points), -1), curve.normals.copy()
     owner[rows], normals[rows] = made.vertex_of_point, made.normals
-    stand_ins = skeleton.stand_ins[others]
+    stand_ins = curve.stand_ins[others]
     alone = others[stand_ins == others]
     if len(alone):
-        alone = alone[morton_order(skeleton.points[alone])]  # the tree is quicker with what is near in turn
-        owner[alone] = made.vertex_of_point[cKDTree(points).query(skeleton.points[alone])[1]]
+        alone = alone[morton_order(curve.points[alone])]  # the tree is quicker with what is near in turn
+        owner[alone] = made.vertex_of_point[cKDTree(points).query(curve.points[alone])[1]]
     owner[others] = owner[stand_ins]
     normals[others[np.isnan(normals[stand_ins, 0])]] = np.nan
-    return with_fields(made, points=skeleton.points, normals=normals, vertex_of_point=owner)
+    return with_fields(made, points=curve.points, normals=normals, vertex_of_point=owner)
 
 
-def in_order(step: Callable[[Skeleton], Skeleton], skeleton: Skeleton, distinct: bool = False) -> Skeleton:
-    """What a step makes of a skeleton whose points are along a Morton curve, whatever order they came in.
+def in_order(step: Callable[[Curve], Curve], curve: Curve, distinct: bool = False) -> Curve:
+    """What a step makes of a curve whose points are along a Morton curve, whatever order they came in.
 
     That would show in the last digit of sums, and where one thing is as good as another, as on grids, it decides. In
     the result the points are as they came. The step may have one point alone of every `distinct` place.
     """
-    rows = np.flatnonzero(skeleton.vertex_of_point >= 0)
-    rows = rows[first_in_their_place(skeleton.points[rows])] if distinct else rows
-    return on_rows(step, skeleton, rows[morton_order(skeleton.points[rows])] if len(rows) else rows)
+    rows = np.flatnonzero(curve.vertex_of_point >= 0)
+    rows = rows[first_in_their_place(curve.points[rows])] if distinct else rows
+    return on_rows(step, curve, rows[morton_order(curve.points[rows])] if len(rows) else rows)
 
 
-def _nearest_edges(skeleton: Skeleton, supporting: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _nearest_edges(curve: Curve, supporting: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Of the edges at a point's vertex the nearest, or -1 if it has none, and where on it."""
-    vertex = skeleton.vertex_of_point[supporting]
-    around = incident_edges(skeleton.edges, len(skeleton.vertices))[vertex]
-    edge, t = nearest_on_edges(skeleton.vertices, skeleton.edges, around, skeleton.points[supporting])
-    return np.where(skeleton.degree[vertex] > 0, edge, -1), t
+    vertex = curve.vertex_of_point[supporting]
+    around = incident_edges(curve.edges, len(curve.vertices))[vertex]
+    edge, t = nearest_on_edges(curve.vertices, curve.edges, around, curve.points[supporting])
+    return np.where(curve.degree[vertex] > 0, edge, -1), t

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
 from ...data.decisions import QUESTIONS, Decision
-from ...data.skeleton import Skeleton
+from ..curve import Curve
 from ...geometry.groups import quantile
 from ...geometry.near_links import linked
 from ...geometry.polylines import arc_lengths
@@ -21,7 +21,7 @@ from .spurs import NOT_BESIDE
 # All fitted but where it says otherwise.
 BRIDGE_REACH = 6.0  # longest gap, in radii of the end
 BRIDGE_COSINE = 0.5  # least cosine between the bridge and the end
-DETOUR = 3.0  # least way along the skeleton over that across the gap; less would make a loop of nothing
+DETOUR = 3.0  # least way along the curve over that across the gap; less would make a loop of nothing
 BRIDGE_SAMPLES = np.arange(1, 8)[:, None] / 8  # derived: places along a bridge, evenly
 
 
@@ -32,47 +32,47 @@ class _End(NamedTuple):
     radius: float
 
 
-def bridge_gaps(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Decision]]:
+def bridge_gaps(curve: Curve, evidence: Evidence, least: float) -> tuple[Curve, list[Decision]]:
     """Join ends with other ends, or with the side of something, where the object probably goes on; the surest first.
 
     A gap is bridged by an edge from a probability of `least` on. There is one decision for each end that points at
     something, of its likeliest bridge.
     """
-    found = [(QUESTIONS["gap"].probability(facts), pair) for pair, facts in gap_facts(skeleton, evidence)]
+    found = [(QUESTIONS["gap"].probability(facts), pair) for pair, facts in gap_facts(curve, evidence)]
     used: set[int] = set()
     decisions, bridges = [], []
     for chance, pair in sorted(found, key=lambda each: -each[0]):
         if used.isdisjoint(pair):
-            place = skeleton.vertices[list(pair)].mean(axis=0)
+            place = curve.vertices[list(pair)].mean(axis=0)
             decisions.append(Decision("gap", tuple(place.tolist()), chance, chance >= least))
             used.update(pair)
             if chance >= least:
                 bridges.append(sorted(pair))
     if not bridges:
-        return skeleton, decisions
-    bridged = replace(skeleton, edges=np.unique(np.concatenate([skeleton.edges, bridges]), axis=0))
-    return with_gaps(bridged, skeleton.vertices[np.array(bridges)]), decisions
+        return curve, decisions
+    bridged = curve.changed(edges=np.unique(np.concatenate([curve.edges, bridges]), axis=0))
+    return bridged.with_gaps(curve.vertices[np.array(bridges)]), decisions
 
 
-def gap_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[tuple[int, int], dict[str, float]]]:
+def gap_facts(curve: Curve, evidence: Evidence) -> Iterator[tuple[tuple[int, int], dict[str, float]]]:
     """What speaks for and against a bridge, for every end and the places that it points at: (leaf, vertex), and facts.
 
-    The facts are: the least winding number along the bridge, over the median on the skeleton; and how far the end is
+    The facts are: the least winding number along the bridge, over the median on the curve; and how far the end is
     closed: the flux of its outward normals through its cross-section, 1 for a cap and 0 for a tube cut open, as a
     logarithm.
     """
-    ends = list(_ends(skeleton))
+    ends = list(_ends(curve))
     if not ends or not len(evidence.points):
         return
-    typical = quantile(evidence.winding_along(skeleton))
+    typical = quantile(evidence.winding_along(curve))
     if typical < LEAST_INSIDE:
         return  # parts too thin to have an inside, which could go on across a gap
     leaves = [end.leaf for end in ends]
-    along = dijkstra(linked(skeleton.vertices, skeleton.edges), indices=leaves)
-    found = [(end, other) for i, end in enumerate(ends) for other in _aims(skeleton, end, along[i], leaves, along)]
+    along = dijkstra(linked(curve.vertices, curve.edges), indices=leaves)
+    found = [(end, other) for i, end in enumerate(ends) for other in _aims(curve, end, along[i], leaves, along)]
     if not found:
         return
-    across = [skeleton.vertices[other] - end.place for end, other in found]
+    across = [curve.vertices[other] - end.place for end, other in found]
     samples = [end.place + BRIDGE_SAMPLES * way for (end, *_), way in zip(found, across, strict=True)]
     winding = evidence.winding(np.concatenate(samples)).reshape(len(found), -1).min(axis=1) / typical
     for (end, other), least in zip(found, winding, strict=True):
@@ -80,14 +80,14 @@ def gap_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[tuple[in
         yield (end.leaf, other), facts
 
 
-def _aims(skeleton: Skeleton, end: _End, travelled: np.ndarray, leaves: list[int], along: np.ndarray) -> Iterator[int]:
+def _aims(curve: Curve, end: _End, travelled: np.ndarray, leaves: list[int], along: np.ndarray) -> Iterator[int]:
     """Vertices that an end points at across a gap: the nearest other end, and the nearest place else."""
-    across = skeleton.vertices - end.place
+    across = curve.vertices - end.place
     away = np.maximum(norm(across), TINY)
     cosine = across @ end.outward / away
-    free = skeleton.degree == 1
-    gap = away - np.where(free, 0, skeleton.radii)
-    aims = (gap < BRIDGE_REACH * end.radius) & (cosine > BRIDGE_COSINE) & (skeleton.degree > 0)
+    free = curve.degree == 1
+    gap = away - np.where(free, 0, curve.radii)
+    aims = (gap < BRIDGE_REACH * end.radius) & (cosine > BRIDGE_COSINE) & (curve.degree > 0)
     aims &= travelled > DETOUR * away
     cost = gap + away * (1 - cosine) / 2
     # what the way by an end leads to is behind it, and not asked for itself
@@ -109,13 +109,13 @@ def _cap(end: _End, evidence: Evidence) -> float:
     return float(evidence.areas[near] @ facing / max(np.pi * end.radius**2, TINY))
 
 
-def _ends(skeleton: Skeleton) -> Iterator[_End]:
+def _ends(curve: Curve) -> Iterator[_End]:
     """Leaves, with the directions in which their branches end, and the median radii of these."""
-    for branch in skeleton.branches:
-        radius = quantile(skeleton.radii[branch])
+    for branch in curve.branches:
+        radius = quantile(curve.radii[branch])
         for path in (branch, branch[::-1]):
-            if skeleton.degree[path[0]] == 1 and radius > 0:
-                places = skeleton.vertices[path]
+            if curve.degree[path[0]] == 1 and radius > 0:
+                places = curve.vertices[path]
                 back = int(np.searchsorted(arc_lengths(places)[1:], HEADING_RADII * radius)) + 1
                 way = places[0] - places[min(back, len(path) - 1)]
                 yield _End(int(path[0]), places[0], way / max(np.linalg.norm(way), TINY), radius)

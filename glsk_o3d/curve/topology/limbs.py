@@ -1,4 +1,4 @@
-"""The branches of a skeleton, seen from the junctions that they leave."""
+"""The branches of a curve, seen from the junctions that they leave."""
 
 from collections import defaultdict
 from functools import cache
@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...data.skeleton import Skeleton
+from ..curve import Curve
 from ...geometry.groups import quantile
 from ...geometry.polylines import arc_lengths, place_at, relative_distance
 from ...geometry.vectors import TINY, dot, norm
@@ -44,7 +44,7 @@ def _split(branch: np.ndarray, joint: np.ndarray) -> list[np.ndarray]:
 
 
 class Limbs:
-    """The branches of a skeleton seen from their junctions.
+    """The branches of a curve seen from their junctions.
 
     The `surface` (M,) is as far from every vertex; without points, its radius. Of every branch there is the `radius`
     (B,), the median of that along it, and whether it is `inner` (B,), between two junctions. The `paths` lead from
@@ -52,11 +52,11 @@ class Limbs:
     be `joints`, too, int array, where branches are split.
     """
 
-    def __init__(self, skeleton: Skeleton, joints: np.ndarray | None = None) -> None:
-        self.vertices, degree = skeleton.vertices, skeleton.degree
-        surface = VertexPoints(skeleton).distance
-        self.surface = np.where(surface > 0, surface, skeleton.radii)
-        self.branches = skeleton.branches
+    def __init__(self, curve: Curve, joints: np.ndarray | None = None) -> None:
+        self.vertices, degree = curve.vertices, curve.degree
+        surface = curve.cloud.distance
+        self.surface = np.where(surface > 0, surface, curve.radii)
+        self.branches = curve.branches
         joint = degree > 2
         if joints is not None and len(joints):
             joint[joints] = True

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ...data.decisions import QUESTIONS, Decision
-from ...data.skeleton import Skeleton
+from ..curve import Curve
 from ...geometry.cycles import minimum_cycle_basis, places_inside
 from ...geometry.groups import component_labels, group_rank, quantile
 from ...geometry.near_links import link_growth
@@ -29,7 +29,7 @@ WIRES_ON_LOOPS = 0.9  # fitted: share of what has no surface that is on wide loo
 WALL_SECTORS = 16  # precision: directions around a place in which walls are looked for
 
 
-def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Decision]]:
+def close_loops(curve: Curve, evidence: Evidence, least: float) -> tuple[Curve, list[Decision]]:
     """Close the loops that are handles with a probability of less than `least`, until there are none.
 
     Narrow ones, two strands in one part, are collapsed; wide ones are cut where the fewest bonds cross. Those that
@@ -39,21 +39,21 @@ def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
     decisions: list[Decision] = []
     known, wires = dict[bytes, LoopEvidence](), None
     while True:
-        cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
-        names, tubes = [skeleton.vertices[cycle].tobytes() for cycle in cycles], evidence.tubes(skeleton, cycles)
-        narrow = [evidence.circle(skeleton.vertices[c])[1] < WIDE_LOOP * t for c, t in zip(cycles, tubes, strict=True)]
+        cycles = minimum_cycle_basis(len(curve.vertices), curve.edges, curve.edge_lengths)
+        names, tubes = [curve.vertices[cycle].tobytes() for cycle in cycles], evidence.tubes(curve, cycles)
+        narrow = [evidence.circle(curve.vertices[c])[1] < WIDE_LOOP * t for c, t in zip(cycles, tubes, strict=True)]
         members = [set() if slim else set(c.tolist()) for c, slim in zip(cycles, narrow, strict=True)]
-        wires = _is_frame_of_wires(skeleton, [*set[int]().union(*members)]) if wires is None else wires
+        wires = _is_frame_of_wires(curve, [*set[int]().union(*members)]) if wires is None else wires
         loops, cut, used, left = dict[int, LoopEvidence](), [], set[int](), [*range(len(cycles))]
         while left:  # each waits for those before it; two cuts in what two loops share would tear a piece out of it
             asked, waiting, before = list[int](), list[int](), set[int]()
             for i in left:
                 (asked if before.isdisjoint(members[i]) else waiting).append(i)
                 before |= members[i]
-            ask = partial(loop_facts, skeleton, evidence=evidence)
+            ask = partial(loop_facts, curve, evidence=evidence)
             answers = ask_once(known, [names[i] for i in asked], [cycles[i] for i in asked], ask)
             for i, loop in zip(asked, answers, strict=True):
-                if wires and (skeleton.confidence[cycles[i]] < UNSURE_CONFIDENCE).mean() > MAJORITY:
+                if wires and (curve.confidence[cycles[i]] < UNSURE_CONFIDENCE).mean() > MAJORITY:
                     loop = loop.without_normals()
                 loops[i] = loop
                 if loop.probability < least and not narrow[i]:
@@ -65,13 +65,13 @@ def close_loops(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
         decisions += [each for each in found if each.changed]
         closed = [cycles[i] for i, _, false in rows if false and narrow[i]]
         if not closed and not cut:
-            return skeleton, decisions + found
+            return curve, decisions + found
         if cut:
-            skeleton = drop_edges(skeleton, cut)
+            curve = drop_edges(curve, cut)
         if closed:
-            pairs = np.concatenate([facing_pairs(skeleton.vertices[cycle], cycle) for cycle in closed])
-            labels = component_labels(len(skeleton.vertices), pairs)
-            skeleton = collapse_triangles(merge_vertices(skeleton, labels))
+            pairs = np.concatenate([facing_pairs(curve.vertices[cycle], cycle) for cycle in closed])
+            labels = component_labels(len(curve.vertices), pairs)
+            curve = collapse_triangles(merge_vertices(curve, labels))
 
 
 class LoopEvidence(NamedTuple):
@@ -92,16 +92,16 @@ class LoopEvidence(NamedTuple):
         return self._replace(facts=self.facts | dict(bonds=float(np.log(1 + 0.1))), inside=LEAST_INSIDE)
 
 
-def _is_frame_of_wires(skeleton: Skeleton, wide: list[int]) -> bool:
+def _is_frame_of_wires(curve: Curve, wide: list[int]) -> bool:
     """Whether most has no surface and is on `wide` loops, as in no crown, and does not fill space, as noise does."""
-    thin = skeleton.confidence < UNSURE_CONFIDENCE
+    thin = curve.confidence < UNSURE_CONFIDENCE
     if thin.mean() <= MAJORITY or thin[wide].sum() <= WIRES_ON_LOOPS * thin.sum():
         return False
-    cloud = SpacedPoints(skeleton)
+    cloud = SpacedPoints(curve)
     return bool(np.median(link_growth(cloud.links)[thin[cloud.vertex]]) < SURFACE_GROWTH)
 
 
-def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence) -> list[LoopEvidence]:
+def loop_facts(curve: Curve, cycles: list[np.ndarray], evidence: Evidence) -> list[LoopEvidence]:
     """What speaks for and against that each of some loops is a handle.
 
     The facts are logarithms: of the radius of the largest circle inside it, in spacings of the points, at most six; of
@@ -115,16 +115,16 @@ def loop_facts(skeleton: Skeleton, cycles: list[np.ndarray], evidence: Evidence)
     """
     if not cycles:
         return []
-    bonds, spacing = evidence.bonds(skeleton), max(evidence.spacing, TINY)
-    loops, tubes = [skeleton.vertices[cycle] for cycle in cycles], evidence.tubes(skeleton, cycles)
+    bonds, spacing = evidence.bonds(curve), max(evidence.spacing, TINY)
+    loops, tubes = [curve.vertices[cycle] for cycle in cycles], evidence.tubes(curve, cycles)
     views = [_View(loop, tube, evidence) for loop, tube in zip(loops, tubes, strict=True)]
     vertices, which = np.unique(np.concatenate(cycles), return_inverse=True)  # loops of a lattice share most of theirs
-    along = evidence.winding_at(skeleton.vertices[vertices])[which]
+    along = evidence.winding_at(curve.vertices[vertices])[which]
     medians = [quantile(each) for each in np.split(along, np.cumsum([len(loop) for loop in loops[:-1]]))]
     falls = _falls(views, np.array(medians), evidence)
     found = []
     for cycle, view, inside, fall in zip(cycles, views, medians, falls, strict=True):
-        crossing = crossings(positions(cycle, len(skeleton.vertices)), len(cycle), bonds, closed=True)
+        crossing = crossings(positions(cycle, len(curve.vertices)), len(cycle), bonds, closed=True)
         best = int(np.argmax(view.sight * fall))
         passage = min(view.sight[best] / spacing, CLEAR_SIGHT) * min(fall[best], view.walls(best))
         facts = dict(

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...data.decisions import QUESTIONS, Decision
-from ...data.skeleton import Skeleton
+from ..curve import Curve
 from ...geometry.groups import quantile
 from ...geometry.neighbourhoods import plane_axes
 from ...geometry.polylines import arc_lengths, place_at, relative_distance
@@ -27,7 +27,7 @@ OUTER_PLACES = np.linspace(1 / 3, 1, 5)  # measured: of the length; each but the
 ACROSS = 16  # precision: directions across a branch; eight are enough for flat parts
 
 
-def prune_spurs(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[Skeleton, list[Decision]]:
+def prune_spurs(curve: Curve, evidence: Evidence, least: float) -> tuple[Curve, list[Decision]]:
     """Cut branches whose points hardly stand out of the surface around the limbs that meet there.
 
     The points count, not the curve, since contraction shortens stubs as thick as they are long, and lets thin ones
@@ -40,27 +40,27 @@ def prune_spurs(skeleton: Skeleton, evidence: Evidence, least: float) -> tuple[S
     end, cut or left; at its end.
     """
     decisions: list[Decision] = []
-    given, known = skeleton, dict[bytes, dict[str, float]]()
+    given, known = curve, dict[bytes, dict[str, float]]()
     while True:
-        found = _twigs(skeleton, evidence, known)
+        found = _twigs(curve, evidence, known)
         worst: dict[int, _Twig] = {}
         for twig in found:
             before = worst.get(twig.junction)
             if twig.probability < (before.probability if before else least):
                 worst[twig.junction] = twig
         if not worst:
-            curve = skeleton.vertices, skeleton.radii
+            curve = curve.vertices, curve.radii
             decisions += [limb_decision(*curve, twig.probability, [twig.tip], pruned=False) for twig in found]
-            return with_fields(skeleton, normals=given.normals), decisions
-        group = np.arange(len(skeleton.vertices))
+            return curve.changed(normals=given.normals), decisions
+        group = np.arange(len(curve.vertices))
         for twig in worst.values():
             group[twig.body] = twig.junction
             path = [twig.junction, *twig.body.tolist()]
-            decisions.append(limb_decision(skeleton.vertices, skeleton.radii, twig.probability, path, pruned=True))
+            decisions.append(limb_decision(curve.vertices, curve.radii, twig.probability, path, pruned=True))
         # points of a cut branch are farther from its junction than the surface there is: they have no say any more
-        gone = np.isin(skeleton.vertex_of_point, np.concatenate([twig.body for twig in worst.values()]))
-        normals = np.where(gone[:, None], np.nan, skeleton.normals)
-        skeleton = merge_into(with_fields(skeleton, normals=normals), group)
+        gone = np.isin(curve.vertex_of_point, np.concatenate([twig.body for twig in worst.values()]))
+        normals = np.where(gone[:, None], np.nan, curve.normals)
+        curve = merge_into(curve.changed(normals=normals), group)
 
 
 def limb_decision(
@@ -72,7 +72,7 @@ def limb_decision(
     return Decision("limb", places[-1], probability, pruned, *curve)
 
 
-def limb_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[int, dict[str, float]]]:
+def limb_facts(curve: Curve, evidence: Evidence) -> Iterator[tuple[int, dict[str, float]]]:
     """What speaks for every branch that leaves a junction and has an end: its leaf, and facts.
 
     The facts are: how far its points (all but a tenth, and of a long limb those outside of its body) stand out of the
@@ -80,7 +80,7 @@ def limb_facts(skeleton: Skeleton, evidence: Evidence) -> Iterator[tuple[int, di
     out that has the object beside it; how certain it is, minus the logarithm of what its mean confidence lacks of 1;
     and how slender, minus the logarithm of its radius over the distance of the surface from the junction.
     """
-    return ((twig.tip, twig.facts) for twig in _twigs(skeleton, evidence, {}))
+    return ((twig.tip, twig.facts) for twig in _twigs(curve, evidence, {}))
 
 
 class _Twig(NamedTuple):
@@ -96,39 +96,39 @@ class _Twig(NamedTuple):
         return QUESTIONS["limb"].probability(self.facts)
 
 
-def _twigs(skeleton: Skeleton, evidence: Evidence, known: dict[bytes, dict[str, float]]) -> list[_Twig]:
+def _twigs(curve: Curve, evidence: Evidence, known: dict[bytes, dict[str, float]]) -> list[_Twig]:
     """Branches that leave a junction and have an end, with their facts, which are asked for where they are not known.
 
     What is known is that of the same limbs, from before other branches were cut.
     """
-    limbs, degree = Limbs(skeleton), skeleton.degree
+    limbs, degree = Limbs(curve), curve.degree
     paths = enumerate(branch[::-1] if degree[branch[0]] == 1 else branch for branch in limbs.branches)
     found = [(k, path) for k, path in paths if degree[path[0]] > 2 and degree[path[-1]] == 1]
-    names = [limbs.signature(int(path[0])) + skeleton.vertices[path].tobytes() for _, path in found]
-    facts = ask_once(known, names, found, partial(_facts, skeleton, evidence, limbs))
+    names = [limbs.signature(int(path[0])) + curve.vertices[path].tobytes() for _, path in found]
+    facts = ask_once(known, names, found, partial(_facts, curve, evidence, limbs))
     return [_Twig(int(path[0]), path[1:], int(path[-1]), each) for (_, path), each in zip(found, facts, strict=True)]
 
 
 def _facts(
-    skeleton: Skeleton, evidence: Evidence, limbs: Limbs, found: list[tuple[int, np.ndarray]]
+    curve: Curve, evidence: Evidence, limbs: Limbs, found: list[tuple[int, np.ndarray]]
 ) -> Iterator[dict[str, float]]:
     """What speaks for some branches, given by their numbers and as paths from their junctions."""
-    degree, cloud, sections = skeleton.degree, VertexPoints(skeleton), measure_sections(skeleton)
+    degree, cloud, sections = curve.degree, curve.cloud, curve.sections
     count, wide = cloud.mass, sections.half_width
-    radius, confidence = sections.radius, np.nan_to_num(skeleton.confidence)
+    radius, confidence = sections.radius, np.nan_to_num(curve.confidence)
     ending = np.zeros(len(degree), bool)
     for branch in limbs.branches:
         if 1 in degree[branch[[0, -1]]]:
             ending[branch] = degree[branch] < 3
     surface = cloud.distance
-    outside = [_outside(skeleton.vertices, path, surface[path[0]], wide) for _, path in found]
+    outside = [_outside(curve.vertices, path, surface[path[0]], wide) for _, path in found]
     half = np.array([np.average(wide[part], weights=count[part]) for part in outside])
-    beside = _beside(evidence, skeleton.vertices, sections.across, [path for _, path in found], half)
+    beside = _beside(evidence, curve.vertices, sections.across, [path for _, path in found], half)
     for (k, path), part, own_half, shared in zip(found, outside, half, beside, strict=True):
         junction, body = int(path[0]), path[1:]
         own = cloud.points[cloud.members.of(part)]
         # by how far they are, and not as they come, which depends on how the object is turned
-        points = own[np.argsort(norm(own - skeleton.vertices[junction]))][:: len(own) // SPUR_POINTS + 1]
+        points = own[np.argsort(norm(own - curve.vertices[junction]))][:: len(own) // SPUR_POINTS + 1]
         out = max(_standing_out(limbs, k, junction, points, ending), 0.0) if own_half > 0 else 0.0
         thickness = np.average(radius[part], weights=count[part]) / max(surface[junction], TINY)
         ratio = np.clip(thickness, SLENDEREST, STOUTEST)

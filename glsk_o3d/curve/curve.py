@@ -1,0 +1,60 @@
+"""The working graph of the filters that refine a skeleton: unchecked, and what follows from it is computed once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from ..data.graph import Graph, derived, in_order_of_ends
+from ..data.skeleton import Skeleton
+from .axis.sections import Sections, VertexPoints, measure_sections
+
+
+@dataclass(frozen=True, eq=False)
+class Curve(Graph):
+    """A skeleton while it is refined, with the fields of `Skeleton`: nothing is checked, and edges are in order."""
+
+    @classmethod
+    def of(cls, skeleton: Skeleton) -> Curve:
+        """The curve of a skeleton."""
+        return cls(**_fields(skeleton))
+
+    def to_skeleton(self) -> Skeleton:
+        """The finished skeleton, checked, every point of which represents itself."""
+        return Skeleton(**_fields(self) | dict(representative_of_point=None))
+
+    def rewired(self, edges: np.ndarray, **changes: Any) -> Curve:
+        """The same with other edges, in any order, and other fields.
+
+        Where there are other vertices, what is not given of them is unknown.
+        """
+        if "vertices" in changes:
+            radii, unknown = changes["radii"], np.full(len(changes["vertices"]), np.nan)
+            given = dict(half_width=radii, half_thickness=radii, confidence=unknown, support=unknown)
+            changes = given | changes
+        m = len(changes.get("vertices", self.vertices))
+        return self.changed(edges=in_order_of_ends(edges, m), **changes)
+
+    def with_facts(self, **facts: Any) -> Curve:
+        """The same with other facts in its report."""
+        return self.changed(report=replace(self.report, **facts))
+
+    def with_gaps(self, ends: np.ndarray) -> Curve:
+        """The same with the ends, (g, 2, 3) float array, of more stretches that no point supports in its report."""
+        return self.with_facts(joined=(*self.report.joined, *((tuple(a), tuple(b)) for a, b in ends.tolist())))
+
+    @derived("vertices", "vertex_of_point", "points", "normals")
+    def cloud(self) -> VertexPoints:
+        """The points that support it."""
+        return VertexPoints(self)
+
+    @derived("vertices", "edges", "radii", "vertex_of_point", "points", "normals")
+    def sections(self) -> Sections:
+        """The sections of the object at its vertices."""
+        return measure_sections(self, self.cloud)
+
+
+def _fields(graph: Graph) -> dict[str, Any]:
+    return {field.name: getattr(graph, field.name) for field in fields(Graph)}
