@@ -5,9 +5,10 @@ from itertools import product
 import numpy as np
 import pytest
 
-from glsk_o3d import InvalidCloudError, Skeleton, Tracer, pipelines, refiner, samples
+from glsk_o3d import InvalidCloudError, Skeleton, Tracer, pipelines, samples
 from glsk_o3d.curve.shape.junctions import meet
 from glsk_o3d.curve.topology.limbs import Line
+from glsk_o3d.filters import refiner
 
 pytestmark = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
 UNKNOWN = {"normals": "points without one", "support": "not measured", "points": "checked where they come in"}

@@ -106,8 +106,8 @@ def warn(messages: Iterable[str]) -> None:
 
 def outside() -> int:
     """Stack level, as seen from the caller, of the first frame that is not of this package: the user's line."""
-    frame, level = sys._getframe(1), 1
-    while frame.f_back is not None and frame.f_globals.get("__name__", "").startswith(__package__):
+    frame, level, package = sys._getframe(1), 1, __name__.partition(".")[0]
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").startswith(package):
         frame, level = frame.f_back, level + 1
     return level
 

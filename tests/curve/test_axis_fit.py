@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton
-from glsk_o3d.curve import axis_fit
+from glsk_o3d.curve.axis import fit as axis_fit
 from glsk_o3d.curve.axis.fit import HALF_SUPPORT
 from glsk_o3d.curve.axis.sections import measure_sections
 

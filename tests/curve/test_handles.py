@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from glsk_o3d import refiner, skeletonize
+from glsk_o3d import skeletonize
 from glsk_o3d.curve.shape.handles import Handles
 from glsk_o3d.curve.topology.limbs import Limbs
+from glsk_o3d.filters import refiner
 from glsk_o3d.samples.capsules import union_sample
 
 BODY, HANDLE, REACH = 0.4, 0.06, 0.28

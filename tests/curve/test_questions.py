@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d import Connector, Contractor, Report, pipelines, samples, skeletonize
-from glsk_o3d.curve import loops, spurs
+from glsk_o3d.curve.topology import loops, spurs
 from glsk_o3d.curve.topology.evidence import LEAST_INSIDE, Evidence
 from glsk_o3d.curve.topology.loops import CLEAR_SIGHT, WIDE_OPEN, WIDEST_FIRST, loop_facts
 from glsk_o3d.geometry.cycles import minimum_cycle_basis

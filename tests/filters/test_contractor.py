@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from glsk_o3d import Contractor, LPRReducer, Pipeline, RingBuilder, Sampler, pipelines, samples
-from glsk_o3d import contractor as module
+from glsk_o3d.filters import contractor as module
 from glsk_o3d.filters.contractor import LINE_VARIANCE, explained_score
 from glsk_o3d.geometry.cotangent import cotangent_laplacian
 from glsk_o3d.geometry.solver import SolveError

@@ -21,9 +21,9 @@ from glsk_o3d import (
     SkeletonWarning,
     Tracer,
     pipelines,
-    refiner,
     samples,
 )
+from glsk_o3d.filters import refiner
 
 PUBLISHED = pipelines.cao2010().stages[-1]
 
