@@ -8,8 +8,9 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 
 from .analysis.branches import branch_table
 from .curve.detail import with_limbs
-from .curve.thin.rooted import RootPlace, numbered_from, root_among
-from .curve.topology.collapse import merge_into, some_vertices
+from .curve.merging import merge_into
+from .data.graph import all_of_vertices
+from .curve.rooted import RootPlace, numbered_from, root_among
 from .data.skeleton import Skeleton, of_input
 from .errors import InvalidParameterError
 from .geometry.near_links import linked
@@ -47,7 +48,7 @@ def largest_component(skeleton: Skeleton) -> Skeleton:
     index = np.where(stays, np.cumsum(stays) - 1, -1)
     left = replace(
         skeleton,
-        **some_vertices(skeleton, stays),
+        **all_of_vertices(skeleton, stays),
         edges=index[skeleton.edges[stays[skeleton.edges[:, 0]]]],
         vertex_of_point=np.append(index, -1)[skeleton.vertex_of_point],
     )

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from .curve.topology.evidence import ENOUGH_POINTS
+from .curve.surface import ENOUGH_POINTS
 from .data.contraction import Contraction
 from .data.skeleton import Skeleton
 from .filters.connector import Connector

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..curve.thin.rooted import root_among
+from ..curve.rooted import root_among
 from ..data.skeleton import Skeleton, check_skeleton
 from ..errors import InvalidParameterError
 from ..geometry.cycles import edges_on_cycles

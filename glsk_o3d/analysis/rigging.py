@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array
 
-from ..curve.thin.rooted import numbered_from
-from ..curve.topology.collapse import merge_into
+from ..curve.merging import merge_into
+from ..curve.rooted import numbered_from
 from ..data.skeleton import Skeleton
 from ..geometry.groups import group_rank
 from ..geometry.polylines import arc_lengths, incident_edges, nearest_on_edges, place_at

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..data.graph import Graph, derived, in_order_of_ends
+from ..data.derived import derived
+from ..data.graph import Graph, in_order_of_ends
 from ..data.skeleton import Skeleton
 from .axis.sections import Sections, VertexPoints, measure_sections
 
@@ -44,6 +45,18 @@ class Curve(Graph):
     def with_gaps(self, ends: np.ndarray) -> Curve:
         """The same with the ends, (g, 2, 3) float array, of more stretches that no point supports in its report."""
         return self.with_facts(joined=(*self.report.joined, *((tuple(a), tuple(b)) for a, b in ends.tolist())))
+
+    @property
+    def binary_size(self) -> float:
+        """The power of two next to its extent, so that scaling by it rounds nothing; 1 if it has none."""
+        extent = np.ptp(self.vertices, axis=0).max(initial=0)
+        return float(2.0 ** np.round(np.log2(extent))) if extent > 0 else 1.0
+
+    def scaled(self, factor: float) -> Curve:
+        """The same in another unit of length."""
+        lengths = ("vertices", "points", "radii", "half_width", "half_thickness")
+        other = self.changed(**{name: factor * getattr(self, name) for name in lengths})
+        return other.with_facts(joined=()).with_gaps(factor * np.array(self.report.joined).reshape(-1, 2, 3))
 
     @derived("vertices", "vertex_of_point", "points", "normals")
     def cloud(self) -> VertexPoints:

@@ -1,4 +1,4 @@
-"""Turn the detail of a curve up and down: limbs by their probability, after a Refiner has judged them."""
+"""Turn the detail of a skeleton up and down: limbs by their probability, after a Refiner has judged them."""
 
 import heapq
 from collections import defaultdict
@@ -11,36 +11,37 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..data.decisions import Decision
-from .curve import Curve
+from ..data.graph import OF_VERTICES
+from ..data.skeleton import Skeleton
 from ..geometry.pairing import final_representatives
 from ..geometry.paths import maximal_paths
 from ..geometry.polylines import arc_lengths
 from ..geometry.vectors import TINY, norm
-from .topology.spurs import limb_decision
+from .topology.spurs import limb_candidate
 
-MOST_MOVED = 2.0  # derived: radii that an end, or all of its branch, or a junction moves while the curve is refined
+MOST_MOVED = 2.0  # derived: radii that an end, or all of its branch, or a junction moves while the skeleton is refined
 EVEN = 0.5  # derived: probability from which something is more likely than not
 NEAREST_TIPS = 8  # speed: of which a decision may be about one
 
 
 class Limbs(NamedTuple):
-    """A curve with all branches that were pruned, and the decisions about its limbs."""
+    """A skeleton with all branches that were pruned, and the decisions about its limbs."""
 
-    vertices: np.ndarray  # (n, 3) those of the curve, and then those of pruned branches
+    vertices: np.ndarray  # (n, 3) those of the skeleton, and then those of pruned branches
     radii: np.ndarray  # (n,)
     edges: np.ndarray  # (e, 2) in the same order
     judged: dict[int, Decision]  # by the vertex at the end
 
 
-def all_limbs(curve: Curve) -> Limbs:
-    """A curve with its pruned branches, each joined to a vertex near the junction that it left, but no end.
+def all_limbs(skeleton: Skeleton) -> Limbs:
+    """A skeleton with its pruned branches, each joined to a vertex near the junction that it left, but no end.
 
     It is that whose ball, of its radius, has the old junction deepest inside. The last branch to be pruned is the first
     to come back, since others may have left it. Those that left a place where nothing is any more are left out.
     """
-    vertices, radii, edges, judged = curve.vertices, curve.radii, [curve.edges], _judged_ends(curve)
-    inner = curve.degree > 1
-    for limb in reversed(curve.report.decisions):
+    vertices, radii, edges, judged = skeleton.vertices, skeleton.radii, [skeleton.edges], _judged_ends(skeleton)
+    inner = skeleton.degree > 1
+    for limb in reversed(skeleton.report.decisions):
         if limb.about != "limb" or not limb.changed or not limb.branch or not inner.any():
             continue
         places = np.array(limb.branch)
@@ -95,70 +96,69 @@ def pruning_order(limbs: Limbs) -> Iterator[tuple[Decision, float, list[int]]]:
                     chance[end] = 1 - (1 - chance[end]) * none[junction]
 
 
-def with_limbs(curve: Curve, least: float) -> Curve:
-    """A curve with all branches that are limbs with a probability of at least `least`, and without others.
+def with_limbs(skeleton: Skeleton, least: float) -> Skeleton:
+    """A skeleton with all branches that are limbs with a probability of at least `least`, and without others.
 
     Points of branches that go belong to the junction; those nearer to a branch that comes than to their vertex to it.
     What samples of the cloud said about its parts is dropped.
     """
-    limbs, m = all_limbs(curve), len(curve.vertices)
+    limbs, m = all_limbs(skeleton), len(skeleton.vertices)
     into, gone = np.arange(len(limbs.vertices)), dict[Decision, tuple[float, list[int]]]()
     for limb, chance, path in takewhile(lambda each: each[1] < least, pruning_order(limbs)):
         into[path[1:]] = path[0]
         gone[limb] = chance, path
     stays = into == np.arange(len(into))
     if stays[:m].all() and not stays[m:].any():
-        return curve
-    owner = np.append(final_representatives(into)[:m], -1)[curve.vertex_of_point]
+        return skeleton
+    owner = np.append(final_representatives(into)[:m], -1)[skeleton.vertex_of_point]
     more, rows = m + np.flatnonzero(stays[m:]), np.flatnonzero(owner >= 0)
     if len(more) and len(rows):
-        points = curve.points[rows]
+        points = skeleton.points[rows]
         distance, nearest = cKDTree(limbs.vertices[more]).query(points)
         nearer = distance < norm(points - limbs.vertices[owner[rows]])
         owner[rows[nearer]] = more[nearest[nearer]]
     unknown = np.full(len(into) - m, np.nan)
-    known = {name: np.r_[getattr(curve, name), unknown] for name in OF_VERTICES}
+    known = {name: np.r_[getattr(skeleton, name), unknown] for name in OF_VERTICES}
     for name in ("radii", "half_width", "half_thickness"):
         known[name][m:] = limbs.radii[m:]
     decisions, back = [], {limb for limb in limbs.judged.values() if limb.changed} - set(gone)
-    for each in curve.report.decisions:
+    for each in skeleton.report.decisions:
         if each.changed or each not in gone:
             decisions.append(replace(each, changed=False, branch=(), radii=()) if each in back else each)
     decisions += [
-        limb_decision(limbs.vertices, limbs.radii, chance, path, pruned=True)
+        limb_candidate(limbs.vertices, limbs.radii, np.array(path), {}, chance, True).decision("limb")
         for limb, (chance, path) in gone.items()
         if not limb.changed
     ]
     index = np.append(np.cumsum(stays) - 1, -1)
-    return replace(
-        curve,
+    return skeleton.changed(
         **{name: values[stays] for name, values in known.items()},
         vertices=limbs.vertices[stays],
         edges=index[limbs.edges[stays[limbs.edges].all(axis=1)]],
         vertex_of_point=index[owner],
-        report=replace(curve.report, decisions=tuple(decisions), support=(), n_draws=0, n_agreeing=0),
+        report=replace(skeleton.report, decisions=tuple(decisions), support=(), n_draws=0, n_agreeing=0),
     )
 
 
-def _judged_ends(curve: Curve) -> dict[int, Decision]:
+def _judged_ends(skeleton: Skeleton) -> dict[int, Decision]:
     """The decisions about limbs that were kept, each by the vertex at the end that it is about.
 
     Ends have moved since: the nearest decisions and ends belong together. The root of a tree is no limb's end.
     """
-    kept = [it for it in curve.report.decisions if it.about == "limb" and not it.changed]
+    kept = [it for it in skeleton.report.decisions if it.about == "limb" and not it.changed]
     reach: dict[int, float] = {}
-    for path in curve.branches:
-        path = path if curve.degree[path[-1]] == 1 else path[::-1]
-        if curve.degree[path[-1]] == 1 and curve.degree[path[0]] > 2:
-            tip, length = int(path[-1]), float(arc_lengths(curve.vertices[path])[-1])
-            reach[tip] = max(MOST_MOVED * float(curve.radii[tip]), length)
-    if root := curve.report.root:
-        reach.pop(int(norm(curve.vertices - root).argmin()), None)
+    for path in skeleton.branches:
+        path = path if skeleton.degree[path[-1]] == 1 else path[::-1]
+        if skeleton.degree[path[-1]] == 1 and skeleton.degree[path[0]] > 2:
+            tip, length = int(path[-1]), float(arc_lengths(skeleton.vertices[path])[-1])
+            reach[tip] = max(MOST_MOVED * float(skeleton.radii[tip]), length)
+    if root := skeleton.report.root:
+        reach.pop(int(norm(skeleton.vertices - root).argmin()), None)
     if not kept or not reach:
         return {}
     tips = list(reach)
     near = min(NEAREST_TIPS, len(tips))
-    distance, nearest = cKDTree(curve.vertices[tips]).query([it.place for it in kept], range(1, near + 1))
+    distance, nearest = cKDTree(skeleton.vertices[tips]).query([it.place for it in kept], range(1, near + 1))
     found: dict[int, Decision] = {}
     free = set(range(len(kept)))
     for pair in np.argsort(distance, axis=None, kind="stable").tolist():

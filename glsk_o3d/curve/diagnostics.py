@@ -1,15 +1,11 @@
-"""Warnings about places without a meaningful curve curve: sheets, balls, and points that do not determine it."""
-
-from dataclasses import replace
+"""Warnings about places without a meaningful curve skeleton: sheets, balls, and points that do not determine it."""
 
 import numpy as np
 
 from ..data.decisions import coordinates
-from .curve import Curve
 from ..geometry.groups import component_labels, group_median, group_sum
 from ..geometry.vectors import dot, norm
-from .axis.sections import VertexPoints, measure_sections
-from .topology.collapse import with_fields
+from .curve import Curve
 
 SHEET_SHARE = 0.9  # fitted: share of one direction among the normals around a vertex; a tube has 0.5, half a tube too
 # warning: spread of the normal lines around where they meet, over the radius; a ball has 0, a torus 0.65, a tube 1
@@ -33,7 +29,7 @@ def measured(curve: Curve) -> Curve:
     sections = curve.sections
     curve = curve.changed(half_width=sections.half_width, half_thickness=sections.half_thickness)
     others = [message for message in curve.report.warnings if message.partition(":")[0] not in REASONS]
-    return curve.changed(report=replace(curve.report, warnings=(*others, *diagnose(curve))))
+    return curve.with_facts(warnings=(*others, *diagnose(curve)))
 
 
 def diagnose(curve: Curve) -> list[str]:
@@ -55,13 +51,13 @@ def diagnose(curve: Curve) -> list[str]:
     component = part[vertex]
     size = np.bincount(component, minlength=n)[:, None]
     one_way = np.linalg.eigvalsh(group_sum(along, vertex, len(count)))[:, 2] > SHEET_SHARE * np.maximum(count, 1)
-    curve = np.bincount(part[curve.edges[:, 0]], curve.edge_lengths, n)
-    stub = curve < STUB_LENGTH * group_median(curve.half_width[vertex], component, n)
+    length = np.bincount(part[curve.edges[:, 0]], curve.edge_lengths, n)
+    stub = length < STUB_LENGTH * group_median(curve.half_width[vertex], component, n)
     sheet = count[one_way & (~(curve.confidence >= LOW_CONFIDENCE) | stub[part])].sum() / len(vertex)
     if sheet > MAJORITY:
         return [
             f"sheet-like: around {sheet:.0%} of the points the surface faces one direction only, "
-            "so a curve curve has little meaning; if that is a table or a floor under an object, remove it first, "
+            "so a curve skeleton has little meaning; if that is a table or a floor under an object, remove it first, "
             "with Open3D's segment_plane or read_cloud(..., where='z > ...')"
         ]
 
@@ -79,7 +75,7 @@ def diagnose(curve: Curve) -> list[str]:
     if share > MAJORITY:
         return [
             f"sphere-like: the normals of parts with {share:.0%} of the points meet in one point, "
-            "so no curve curve is meaningful there"
+            "so no curve skeleton is meaningful there"
         ]
     spread = group_sum(np.einsum("ni,nj->nij", points, points), component, n) / np.maximum(size, 1)[:, :, None]
     mean = group_sum(points, component, n) / np.maximum(size, 1)
@@ -89,7 +85,7 @@ def diagnose(curve: Curve) -> list[str]:
     if share > MAJORITY:
         return [
             f"sphere-like: parts with {share:.0%} of the points are hardly longer than thick, "
-            "so no curve curve is meaningful there"
+            "so no curve skeleton is meaningful there"
         ]
     if len(curve.edges) == 0:
         return ["no edges: every part became one vertex; is Connector.radius larger than the parts are long?"]

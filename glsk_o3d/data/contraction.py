@@ -83,21 +83,18 @@ class Contraction(Representatives):
         return self.frame.out_of(self.positions)
 
     @property
-    def surface_points(self) -> Ints:
-        """Input points that tell where the surface is, (s,) int array.
+    def surface_representatives(self) -> Ints:
+        """For every input point that which shows the surface there, (N,) int array; -1 where it is not known.
 
-        Those of every place that had a ring, since these are evenly apart; and all where there is noise, or was before
-        they were averaged, since it is their mean.
+        Points represent themselves at every place that had a ring, since these are evenly apart; and all do where there
+        is noise, or was before they were averaged, since it is their mean. Others are represented by that of the sample
+        which stands for them, if it is another one.
         """
         several = np.bincount(self.representative_of_point[self.sampled], minlength=len(self.cloud)) > 1
-        some = self.sampled & (self._of_points((self.noise > 0) | several) > 0)
-        some[self._point_of_row[self.thinned]] = True
-        return np.flatnonzero(some)
-
-    @property
-    def stand_ins(self) -> Ints:
-        """For every input point that of the sample which stands for it, (N,) int array; -1 for dropped points."""
-        return self._of_points(self._point_of_row)
+        shows = self.sampled & (self._of_points((self.noise > 0) | several) > 0)
+        shows[self._point_of_row[self.thinned]] = True
+        points, others = np.arange(len(self.points)), self._of_points(self._point_of_row)
+        return np.where(shows, points, np.where(others == points, -1, others))
 
     @property
     def ring_ratio(self) -> float:

@@ -12,19 +12,14 @@ from ..geometry.vectors import FARTHEST_PLACE
 Place: TypeAlias = tuple[float, float, float]
 
 
-class Question(NamedTuple):
-    """A question about the topology: a small logistic model of the facts that speak for and against it."""
+class Words(NamedTuple):
+    """How the answer to a question about the topology is told."""
 
     asks: str  # what the probability is of, with the place
     kept: str  # what was done where the graph stayed as it was
     changed: str  # and where it was changed
     option: str  # of the Refiner: the probability that decides
     changes_from: bool  # whether the graph is changed from that on; otherwise below it
-    weights: Mapping[str, float]  # of the facts, and of a constant
-
-    def probability(self, facts: Mapping[str, float]) -> float:
-        """What the weighted sum of some facts stands for."""
-        return logistic(self.weights, facts)
 
 
 def logistic(weights: Mapping[str, float], facts: Mapping[str, float]) -> float:
@@ -33,43 +28,11 @@ def logistic(weights: Mapping[str, float], facts: Mapping[str, float]) -> float:
     return float(1 / (1 + np.exp(-np.clip(total, -50, 50))))
 
 
-# All weights are fitted, by benchmarks/calibrate.py on random shapes and things as scanners see them; docs/method.md
-# says what the facts are.
-QUESTIONS = {
-    "loop": Question(
-        "the loop at ({}) is a handle",
-        "loop kept",
-        "loop closed",
-        "handle",
-        False,
-        dict(constant=-0.3, opening=1.5, passage=4.5, bonds=2.4),
-    ),
-    "limb": Question(
-        "the branch at ({}) is a limb",
-        "limb kept",
-        "spur pruned",
-        "limb",
-        False,
-        dict(constant=-3.0, protrusion=3.2, certainty=1.8, slenderness=1.0),
-    ),
-    "air": Question(
-        "the branch at ({}) crosses air",
-        "branch kept",
-        "branch cut",
-        "air",
-        True,
-        dict(
-            constant=-5.8, deficit=1.7, surface=-0.5, straightness=-3.2, noise=1.9, bonds=-0.9, inner=3.4, length=-0.5
-        ),
-    ),
-    "gap": Question(
-        "the object goes on across the gap at ({})",
-        "gap left",
-        "gap bridged",
-        "bridge",
-        True,
-        dict(constant=-1.7, winding=3.7, cap=-1.2),
-    ),
+WORDS = {
+    "loop": Words("the loop at ({}) is a handle", "loop kept", "loop closed", "handle", False),
+    "limb": Words("the branch at ({}) is a limb", "limb kept", "spur pruned", "limb", False),
+    "air": Words("the branch at ({}) crosses air", "branch kept", "branch cut", "air", True),
+    "gap": Words("the object goes on across the gap at ({})", "gap left", "gap bridged", "bridge", True),
 }
 """What is asked about loops, about branches that leave a junction, about branches, and about ends, in this order."""
 
@@ -131,23 +94,23 @@ class Decision:
     @property
     def outcome(self) -> str:
         """The action in two words, such as ``"loop closed"`` or ``"gap left"``."""
-        question = QUESTIONS[self.about]
-        return question.changed if self.changed else question.kept
+        words = WORDS[self.about]
+        return words.changed if self.changed else words.kept
 
     @property
     def question(self) -> str:
         """What the probability is of, such as ``"the loop at (0, 0, 1) is a handle"``."""
-        return QUESTIONS[self.about].asks.format(coordinates(self.place))
+        return WORDS[self.about].asks.format(coordinates(self.place))
 
     @property
     def otherwise(self) -> str:
         """The option that would have changed a close call of the Refiner, such as ``"Refiner.limb=0.56"``."""
-        question = QUESTIONS[self.about]
-        if self.changed == question.changes_from:
+        words = WORDS[self.about]
+        if self.changed == words.changes_from:
             hundredths = math.ceil(100 * self.probability + 0.5)
         else:
             hundredths = math.floor(100 * self.probability - 0.5)
-        return f"Refiner.{question.option}={hundredths / 100:.2f}"
+        return f"Refiner.{words.option}={hundredths / 100:.2f}"
 
     def __str__(self) -> str:
         return f"{self.question}: {self.probability:.2f}, {self.outcome}"

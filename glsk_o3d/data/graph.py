@@ -48,6 +48,15 @@ class Graph(Changeable):
         return supporting_points(self.vertex_of_point, self.normals)
 
     @property
+    def surface_points(self) -> np.ndarray:
+        """Supporting points by which a Refiner knows the surface, int array.
+
+        Those that represent themselves; of a skeleton without representatives all.
+        """
+        own = self.representative_of_point == np.arange(len(self.points))
+        return np.flatnonzero(own) if own.any() else self.supporting_points
+
+    @property
     def leaves(self) -> np.ndarray:
         """Vertices with one edge, int array."""
         return np.flatnonzero(self.degree == 1)

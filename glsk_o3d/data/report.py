@@ -14,7 +14,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any, get_args, get_origin, get_type_hints
 
 from ..errors import SkeletonWarning
-from .decisions import QUESTIONS, Decision, Place, Supported
+from .decisions import WORDS, Decision, Place, Supported
 
 NOT_CONTRACTED = "not contracted"
 STOPPED_BY_CALLER = "stopped by the caller"
@@ -247,7 +247,7 @@ class Report:
     def from_dict(cls, data: Mapping[str, Any]) -> Report:
         """Inverse of `to_dict`; unknown entries of later versions are ignored."""
         report: Report = _read(data, cls)
-        if not all(decision.about in QUESTIONS for decision in report.decisions):
+        if not all(decision.about in WORDS for decision in report.decisions):
             raise ValueError("a decision in its report is about an unknown question")
         if not all(decision.is_possible for decision in report.decisions):
             raise ValueError("a decision in its report has a probability, a place or a branch that cannot be")

@@ -126,15 +126,6 @@ class Skeleton(Graph):
         )
 
     @property
-    def surface_points(self) -> np.ndarray:
-        """Supporting points by which a Refiner knows the surface, int array.
-
-        Those that represent themselves; of a skeleton without representatives all.
-        """
-        own = self.representative_of_point == np.arange(len(self.points))
-        return np.flatnonzero(own) if own.any() else self.supporting_points
-
-    @property
     def whole(self) -> Skeleton:
         """This with the points by area of a sampled mesh behind its vertices, as a pipeline or a file gave it."""
         return vars(self).get("_whole", self)

@@ -85,7 +85,7 @@ class Connector(Filter[Skeleton]):
         once = np.where(state.sampled, vertex_of_point, -1)
         normals = np.full_like(state.points, np.nan)
         normals[state.has_normal] = state.normals[state.representative_of_point[state.has_normal]]
-        made = Skeleton(
+        return Skeleton(
             vertices=vertices,
             edges=self._edges(state, vertex_of_survivor),
             radii=plane_distance_radii(vertices, once, state.points, normals),
@@ -93,9 +93,8 @@ class Connector(Filter[Skeleton]):
             points=state.points,
             normals=normals,
             report=state.report,
+            representative_of_point=state.surface_representatives,
         )
-        vars(made).update(surface_points=state.surface_points, stand_ins=state.stand_ins)
-        return made
 
     def _edges(self, state: Contraction, vertex_of_survivor: np.ndarray) -> np.ndarray:
         rings = state.rings

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..curve.topology.evidence import ENOUGH_POINTS
+from ..curve.surface import ENOUGH_POINTS
 from ..data.points import RIDGE_NEIGHBOURS, Points, default_k
 from ..geometry.eigen import main_direction
 from ..geometry.frame import MIN_POINTS

@@ -1,33 +1,33 @@
 """Refiner: raw graph -> one-dimensional, medial skeleton (Wen et al. 2024, section II-D)."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 from ..curve.axis.fit import fit_axis, pull_back_detached
 from ..curve.axis.subdivision import subdivide_edges
+from ..curve.curve import Curve
 from ..curve.diagnostics import measured
+from ..curve.merging import collapse_triangles
+from ..curve.sampling import along_a_morton_curve, on_points, surface_sample
 from ..curve.shape.ends import regrow_ends
 from ..curve.shape.junctions import move_junctions
 from ..curve.shape.wide_ends import level_wide_ends
-from ..curve.thin.deferred import Aside
-from ..curve.thin.detect import without_strays
-from ..curve.topology.air import cut_air
-from ..curve.topology.collapse import binary_size, collapse_triangles, scaled, with_fields
-from ..curve.topology.evidence import Evidence, SurfaceGraph, in_order, on_sample
-from ..curve.topology.gaps import bridge_gaps
-from ..curve.topology.loops import close_loops
-from ..curve.topology.spurs import prune_spurs
-from ..data.decisions import QUESTIONS, Decision
+from ..curve.surface import Surface
+from ..curve.thin.deferred import Deferred
+from ..curve.thin.detect import LEAST_SURFACE, without_detached_clumps
+from ..curve.topology.false_branches import FalseBranches
+from ..curve.topology.gaps import Gaps
+from ..curve.topology.loops import Loops
+from ..curve.topology.question import Question, ask
+from ..curve.topology.spurs import Limbs
+from ..data.decisions import Decision
 from ..data.skeleton import Skeleton
 from ..parameters import documented, parameter
 from ..pipeline import Filter, Watch
-from .tracer import Tracer
 
-ANSWERS = {"loop": close_loops, "limb": prune_spurs, "air": cut_air, "gap": bridge_gaps}
-ORDER_OF_QUESTIONS = ("surface", "loop", "surface", "limb", "air", "limb", "gap", "loop", "limb")
-"""Parts without a surface are set aside at the start, or when their loops are closed.
-
-Spurs are asked about again after cuts and bridges, which may make them, and loops if bridges made more of them."""
+QUESTIONS: tuple[type[Question], ...] = (Loops, Limbs, FalseBranches, Limbs, Gaps, Loops, Limbs)
+"""In this order: cuts and bridges may make spurs, and bridges loops, so these are asked about again."""
 
 
 @documented
@@ -106,83 +106,79 @@ class Refiner(Filter[Skeleton]):
         choices=("medial", "surface"),
     )
 
-    def _run(self, given: Skeleton, watch: Watch | None) -> Skeleton:
-        if not self.recentre:
-            return in_order(self._refined, given)  # every point keeps its vertex
-        refined = on_sample(lambda skeleton: in_order(self._refined, skeleton), given)
-        return without_strays(refined) if self.air and self.bridge else refined
+    def _run(self, skeleton: Skeleton, watch: Watch | None) -> Skeleton:
+        curve = Curve.of(skeleton)
+        if not self.recentre:  # every point keeps its vertex
+            return on_points(self._refined, curve, along_a_morton_curve(curve)).to_skeleton()
+        refined = on_points(self._in_order, curve, surface_sample(curve))
+        return (without_detached_clumps(refined) if self.air and self.bridge else refined).to_skeleton()
 
-    def _refined(self, skeleton: Skeleton) -> Skeleton:
-        skeleton, surface = self._fit(skeleton)
-        asks = self.handle or self.limb or self.air or self.bridge
-        aside = None
-        if _may_be_asked(skeleton) and (asks or self.recentre):
-            skeleton, surface, aside = self._decide(skeleton, surface)
-        if self.recentre and len(skeleton.vertices):
-            skeleton = fit_axis(level_wide_ends(skeleton, surface), self.recentre + 1, surface, settle=True)
-            size = binary_size(skeleton)  # fourth powers of lengths must not overflow
-            grown = regrow_ends(move_junctions(scaled(skeleton, 1 / size)), self.ends == "surface")
-            skeleton = scaled(grown, size)
-        return measured(aside.put_back(skeleton) if aside else skeleton)
+    def _in_order(self, curve: Curve) -> Curve:
+        return on_points(self._refined, curve, along_a_morton_curve(curve))
 
-    def _fit(self, skeleton: Skeleton) -> tuple[Skeleton, SurfaceGraph]:
-        """Make the graph one-dimensional and centre it in the surface around it."""
-        skeleton = collapse_triangles(skeleton, by_degree=self.collapse == "degree")
-        surface = SurfaceGraph.of(skeleton)
+    def _refined(self, curve: Curve) -> Curve:
+        curve = collapse_triangles(curve, by_degree=self.collapse == "degree")
+        surface, deferred = Surface.of(curve), None
         if self.recentre:
-            skeleton = pull_back_detached(skeleton)
-        return self._centred(skeleton, surface), surface
+            curve = pull_back_detached(curve)
+        curve = self._centred(curve, surface)
+        if _may_be_asked(curve) and (self.recentre or self.handle or self.limb or self.air or self.bridge):
+            curve, surface, deferred = self._decided(curve, surface.oriented(curve))
+        if self.recentre and len(curve.vertices):
+            curve = fit_axis(level_wide_ends(curve, surface), self.recentre + 1, surface, settle=True)
+            size = curve.binary_size  # fourth powers of lengths must not overflow
+            curve = regrow_ends(move_junctions(curve.scaled(1 / size)), self.ends == "surface").scaled(size)
+        return measured(deferred.put_back(curve) if deferred else curve)
 
-    def _decide(self, skeleton: Skeleton, surface: SurfaceGraph) -> tuple[Skeleton, SurfaceGraph, Aside | None]:
+    def _decided(self, curve: Curve, surface: Surface) -> tuple[Curve, Surface, Deferred | None]:
         """Answer one question after the other; not again where the graph is the same, or has no more loops."""
-        evidence, aside = Evidence.of(skeleton, surface), None
-        decisions: dict[str, list[Decision]] = {about: [] for about in ANSWERS}
-        settled: dict[str, Skeleton] = {}  # what each question was last asked about
+        curve, surface, deferred = self._without_deferred(curve, surface)
+        decisions: dict[str, list[Decision]] = {question.about: [] for question in (Loops, Limbs, FalseBranches, Gaps)}
+        answered: dict[str, Curve] = {}  # what each question was last asked about
         n_handles = 0
-        for about in ORDER_OF_QUESTIONS:
-            n_handles = min(n_handles, skeleton.n_loops)  # cuts may have opened some
-            if settled.get(about) is skeleton or not _may_be_asked(skeleton):
+        for question in QUESTIONS:
+            n_handles = min(n_handles, curve.n_loops)  # cuts may have opened some
+            least, about = getattr(self, question.option), question.about
+            if not least or answered.get(about) is curve or not _may_be_asked(curve):
                 continue
-            if about == "surface":
-                settled[about] = skeleton
-                if self.set_aside and self.handle and not aside and (aside := Aside.of(skeleton, Tracer().surface)):
-                    skeleton = aside.rest()
-                    surface = SurfaceGraph.of(skeleton)
-                    evidence = Evidence.of(skeleton, surface) if _may_be_asked(skeleton) else evidence
+            if question is Loops and curve.n_loops <= n_handles:
                 continue
-            if about == "loop" and skeleton.n_loops <= n_handles:
-                continue
-            skeleton, found = self._asked(about, skeleton, evidence)
-            decisions[about] = _changed(decisions[about]) + found
-            settled[about] = skeleton
-            if about == "loop":
-                n_handles = skeleton.n_loops
+            changed, answers = ask(question(), curve, surface, least)
+            decisions[about] = [*_changes(decisions[about]), *answers]
+            curve = curve if changed is curve else self._centred(changed, surface)
+            answered[about] = curve
+            if question is Loops:
+                n_handles = curve.n_loops
+                if deferred is None:  # loops may have hidden that a part has no surface
+                    curve, surface, deferred = self._without_deferred(curve, surface)
+        counts = {about: len(_changes(found)) for about, found in decisions.items()}
         report = replace(
-            skeleton.report,
-            decisions=tuple(each for found in decisions.values() for each in found),
-            n_loops_closed=len(_changed(decisions["loop"])),
-            n_cuts=len(_changed(decisions["air"])),
-            n_bridges=len(_changed(decisions["gap"])),
+            curve.report,
+            decisions=tuple(decision for about in decisions.values() for decision in about),
+            n_loops_closed=counts["loop"],
+            n_cuts=counts["air"],
+            n_bridges=counts["gap"],
         )
-        return with_fields(skeleton, report=report), surface, aside
+        return curve.changed(report=report), surface, deferred
 
-    def _asked(self, about: str, skeleton: Skeleton, evidence: Evidence) -> tuple[Skeleton, list[Decision]]:
-        """A skeleton after a question was answered for its parts, with the curve fitted anew if it was changed."""
-        limit = getattr(self, QUESTIONS[about].option)
-        if not limit:
-            return skeleton, []
-        answered, found = ANSWERS[about](skeleton, evidence, limit)
-        return (self._centred(answered, evidence) if _changed(found) else skeleton), found
+    def _without_deferred(self, curve: Curve, surface: Surface) -> tuple[Curve, Surface, Deferred | None]:
+        """The curve without parts that are left to a Tracer, and the surface around it."""
+        deferred = Deferred.of(curve, LEAST_SURFACE) if self.set_aside and self.handle else None
+        if not deferred:
+            return curve, surface, None
+        curve = deferred.rest()
+        surface = Surface.of(curve)
+        return curve, surface.oriented(curve) if _may_be_asked(curve) else surface, deferred
 
-    def _centred(self, skeleton: Skeleton, surface: SurfaceGraph) -> Skeleton:
+    def _centred(self, curve: Curve, surface: Surface) -> Curve:
         if self.spacing:
-            skeleton = subdivide_edges(skeleton, self.spacing)
-        return fit_axis(skeleton, self.recentre, surface)
+            curve = subdivide_edges(curve, self.spacing)
+        return fit_axis(curve, self.recentre, surface)
 
 
-def _may_be_asked(skeleton: Skeleton) -> bool:
-    return len(skeleton.edges) > 0 and len(skeleton.supporting_points) > 0
+def _may_be_asked(curve: Curve) -> bool:
+    return len(curve.edges) > 0 and len(curve.supporting_points) > 0
 
 
-def _changed(decisions: list[Decision]) -> list[Decision]:
-    return [each for each in decisions if each.changed]
+def _changes(decisions: Iterable[Decision]) -> list[Decision]:
+    return [decision for decision in decisions if decision.changed]

@@ -6,10 +6,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..curve.curve import Curve
 from ..curve.diagnostics import measured
-from ..curve.thin.detect import may_lack_surface
+from ..curve.sampling import along_a_morton_curve, on_points
+from ..curve.thin.detect import LEAST_SURFACE, may_lack_surface
 from ..curve.thin.trace import trace
-from ..curve.topology.evidence import in_order
 from ..data.skeleton import Skeleton
 from ..geometry.vectors import AXES
 from ..parameters import documented, parameter
@@ -47,7 +48,10 @@ class Tracer(Filter[Skeleton]):
     produces: ClassVar[type] = Skeleton
 
     surface: float = parameter(
-        0.65, "Share of points with a surface below which a region is traced as paths. 0 traces none.", low=0, high=1
+        LEAST_SURFACE,
+        "Share of points with a surface below which a region is traced as paths. 0 traces none.",
+        low=0,
+        high=1,
     )
     root: str | Any = parameter(
         None,
@@ -66,7 +70,9 @@ class Tracer(Filter[Skeleton]):
                     object.__setattr__(self, "root", ",".join(map(repr, point.tolist())))
         super().__post_init__()
 
-    def _run(self, given: Skeleton, watch: Watch | None) -> Skeleton:
-        if self.root is None and not (self.surface and may_lack_surface(given, self.surface)):
-            return given  # as most are: sorting many points would take longer than all else
-        return in_order(lambda some: measured(trace(some, self.surface, self.root)), given, distinct=True)
+    def _run(self, skeleton: Skeleton, watch: Watch | None) -> Skeleton:
+        curve = Curve.of(skeleton)
+        if self.root is None and not (self.surface and may_lack_surface(curve, self.surface)):
+            return skeleton  # as most are: sorting many points would take longer than all else
+        rows = along_a_morton_curve(curve, distinct=True)
+        return on_points(lambda some: measured(trace(some, self.surface, self.root)), curve, rows).to_skeleton()

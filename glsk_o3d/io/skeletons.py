@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..analysis.comparison import Truth
-from ..curve.thin.rooted import RootPlace
+from ..curve.rooted import RootPlace
 from ..data.skeleton import Skeleton
 from ..errors import FileFormatError, brief
 from ..interop.atomic import existing_file, write_atomically

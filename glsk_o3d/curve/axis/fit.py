@@ -8,16 +8,15 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import bsr_array, csc_array
 
-from ..curve import Curve
 from ...geometry.groups import group_sum
 from ...geometry.neighbourhoods import nearest_neighbours
 from ...geometry.polylines import incident_edges, nearest_on_edges, places_on_edges
 from ...geometry.radii import plane_distance_radii, robust_radii
 from ...geometry.solver import factorised
 from ...geometry.vectors import COLUMNS, FULL, ROWS, TINY, Floats, Ints, box, cross, dot, norm, unit
-from ..topology.collapse import with_fields
-from ..topology.evidence import SurfaceGraph
-from .sections import Sections, VertexPoints, half_axes, normal_moments
+from ..curve import Curve
+from ..surface import Surface
+from .sections import Sections, half_axes, normal_moments
 
 FIT_DIFFUSION = 0.6  # fitted: length over which the places of points are smoothed on the surface, over the half width
 FIT_SPREAD = 2**0.5  # fitted: half width where normals say nothing, over that of the points; 1 lets noise bend it
@@ -50,7 +49,7 @@ def pull_back_detached(curve: Curve) -> Curve:
     return curve.changed(vertices=curve.vertices + back[:, None] * mean)
 
 
-def fit_axis(curve: Curve, passes: int, surface: SurfaceGraph | None = None, settle: bool = False) -> Curve:
+def fit_axis(curve: Curve, passes: int, surface: Surface | None = None, settle: bool = False) -> Curve:
     r"""Move the vertices to the axis of the surface; measure how well the points say where it is, and how far it is.
 
     The plane through a point p of a limb, spanned by its normal n and the tangent t of the axis, contains the axis:
@@ -95,7 +94,7 @@ def fit_axis(curve: Curve, passes: int, surface: SurfaceGraph | None = None, set
     low, high = axis_box(p)
     onto = nearest_on_edges(x, ends, edges_at[vertex], p)
     if passes:
-        surface = surface or SurfaceGraph.of(curve)
+        surface = surface or Surface.of(curve)
         smooth = _smoother(surface, points, p)
         spacing = surface.spacing * np.sqrt(len(surface.points) / len(points))
         width = curve.half_width if settle else _nearest(x, ends, *onto, p, n, curve.radii).width
@@ -135,9 +134,7 @@ def _walked(
     return vertex, edge, t
 
 
-def _smoother(
-    surface: SurfaceGraph, points: np.ndarray, p: np.ndarray
-) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+def _smoother(surface: Surface, points: np.ndarray, p: np.ndarray) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
     """What smooths places of points on the surface, each over a length of its own.
 
     Points that the surface leaves out move as far as the one nearest to them.

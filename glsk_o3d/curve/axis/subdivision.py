@@ -1,14 +1,11 @@
 """Subdivide the edges of a curve to a share of the local radius."""
 
-from dataclasses import replace
-
 import numpy as np
 
-from ..curve import Curve
 from ...geometry.polylines import incident_edges
 from ...geometry.vectors import TINY, dot, norm
+from ..curve import Curve
 from .fit import HALF_SUPPORT
-from .sections import VertexPoints, measure_sections
 
 SUBDIVISION_CHUNK = 65536  # speed: points at a time: memory stays flat
 
@@ -55,5 +52,4 @@ def subdivide_edges(curve: Curve, spacing: float) -> Curve:
             nearer = distance < best[some]
             choice[some[nearer]], best[some[nearer]] = sample[nearer], distance[nearer]
         vertex_of_point[part] = choice
-    made = dict(vertices=vertices, edges=edges, radii=radii, vertex_of_point=vertex_of_point)
-    return curve.changed(**NOT_MEASURED | made)
+    return curve.rewired(edges, vertices=vertices, radii=radii, vertex_of_point=vertex_of_point)

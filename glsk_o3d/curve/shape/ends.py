@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..curve import Curve
 from ...geometry.groups import Members, quantile
 from ...geometry.neighbourhoods import plane_axes
 from ...geometry.polylines import arc_lengths, place_at
 from ...geometry.vectors import TINY, Floats, cross, dot, norm, unit
 from ..axis.fit import axis_box
-from ..axis.sections import Sections, VertexPoints, measure_sections
-from ..topology.collapse import with_fields
-from ..topology.limbs import AXIS_LENGTH
+from ..axis.sections import VertexPoints
+from ..curve import Curve
+from ..limbs import AXIS_LENGTH
 
 END_CUT = 1.75  # fitted: distance from where the points stop, in larger half widths, within which a cap bends the curve
 END_SIZE = 4.0  # fitted: radii behind the cut over which it is seen how wide a limb is, and how fast it gets thinner
@@ -60,8 +58,7 @@ def regrow_ends(curve: Curve, to_surface: bool = False) -> Curve:
     """
     if not len(curve.leaves):
         return curve
-    cloud, sections = curve.cloud, curve.sections
-    grown = [found for end in _ends(cloud) if (found := _grow(cloud, sections, *end, to_surface))]
+    grown = [found for end in _ends(curve) if (found := _grow(curve, *end, to_surface))]
     return _replanted(curve, grown) if grown else curve
 
 
@@ -74,13 +71,12 @@ class _Grown(NamedTuple):
     run: np.ndarray  # vertices behind the cut
 
 
-def _ends(cloud: VertexPoints) -> Iterator[tuple[np.ndarray, int, bool]]:
+def _ends(curve: Curve) -> Iterator[tuple[np.ndarray, int, bool]]:
     """Every branch that has a leaf, seen towards it, the first vertex that may go, and whether it begins with a leaf.
 
     The vertex in the middle of a branch with two ends stays. Of another the first vertex out of the part that it grows
     from stays, which says where it leads; one that does not leave that part is none of them.
     """
-    curve = cloud.curve
     for branch in curve.branches:
         leaf, along = curve.degree[branch[[0, -1]]] == 1, arc_lengths(curve.vertices[branch])
         if not along[-1] > 0 or (leaf.all() and len(branch) < 3):
@@ -89,16 +85,15 @@ def _ends(cloud: VertexPoints) -> Iterator[tuple[np.ndarray, int, bool]]:
         for path, ends, stays in ((branch[::-1], leaf[0], len(branch) - 1 - middle), (branch, leaf[1], middle)):
             if ends and not leaf.all():
                 away = norm(curve.vertices[path] - curve.vertices[path[0]])
-                stays = np.flatnonzero(away <= cloud.distance[path[0]])[-1] + 1
+                stays = np.flatnonzero(away <= curve.cloud.distance[path[0]])[-1] + 1
             if ends and stays < len(path):
                 yield path, int(stays + 1), bool(leaf.all())
 
 
-def _grow(
-    cloud: VertexPoints, sections: Sections, path: np.ndarray, first: int, other: bool, to_surface: bool
-) -> _Grown | None:
+def _grow(curve: Curve, path: np.ndarray, first: int, other: bool, to_surface: bool) -> _Grown | None:
     """Cut the end of a path, and let it grow anew; None if too few points say where."""
-    places, radii, half_widths = cloud.curve.vertices[path], sections.radius[path], sections.half_width[path]
+    cloud, sections = curve.cloud, curve.sections
+    places, radii, half_widths = curve.vertices[path], sections.radius[path], sections.half_width[path]
     along = arc_lengths(places)
     last = _last(cloud, path, along, first, other)
     length = along[last]
@@ -328,10 +323,9 @@ def _replanted(curve: Curve, grown: list[_Grown]) -> Curve:
     number, links = np.cumsum(keep) - 1, np.concatenate(edges)
     links = number[links[keep[links].all(axis=1)]]
     known["vertices"] = [curve.vertices, *planted]
-    made = {name: np.concatenate(values)[keep] for name, values in known.items()}
-    made |= dict(edges=links, vertex_of_point=np.append(number, -1)[owner])
-    replanted = curve.changed(**NOT_MEASURED | made)
-    section = measure_sections(replanted).radius
+    of_vertices = {name: np.concatenate(values)[keep] for name, values in known.items()}
+    replanted = curve.rewired(links, **of_vertices, vertex_of_point=np.append(number, -1)[owner])
+    section = replanted.sections.radius
     new = np.flatnonzero(keep) >= len(curve.vertices)
     # without points a vertex has no section, and keeps the radius of the run
-    return with_fields(replanted, radii=np.where(new & (section > 0), section, replanted.radii))
+    return replanted.changed(radii=np.where(new & (section > 0), section, replanted.radii))

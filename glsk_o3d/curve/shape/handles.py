@@ -6,15 +6,15 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..curve import Curve
 from ...geometry.cycles import edges_on_cycles
 from ...geometry.groups import quantile
 from ...geometry.polylines import arc_lengths
 from ...geometry.vectors import TINY, Floats, Ints, cross, dot, norm, unit
 from ..axis.fit import FIT_STAY
-from ..axis.sections import SURFACE_FIT, VertexPoints, half_axes, measure_sections, normal_moments
+from ..axis.sections import SURFACE_FIT, half_axes, normal_moments
+from ..curve import Curve
 from ..diagnostics import STUB_LENGTH
-from ..topology.limbs import AXIS_LEAVES, AXIS_LENGTH, Line
+from ..limbs import AXIS_LEAVES, AXIS_LENGTH, Line
 from .wide_ends import WIDE_NECK, half_widths
 
 HANDLE_STEP = 0.7  # precision: radii from one section to the next; with .3 and .5 the scores are the same
@@ -38,7 +38,7 @@ class Handles:
 
     def __init__(self, curve: Curve) -> None:
         self.curve, self.cloud, self._sections = curve, curve.cloud, curve.sections
-        self._width, self._tree = half_widths(self.cloud, self._sections), cKDTree(self.cloud.points)
+        self._width, self._tree = half_widths(curve), cKDTree(self.cloud.points)
 
     @cached_property
     def bodies(self) -> Ints:

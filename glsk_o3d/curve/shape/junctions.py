@@ -1,20 +1,19 @@
 """Move junctions to where limbs meet: their lines and the surface around say it, and not the contraction."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from ..curve import Curve
 from ...geometry.polylines import arc_lengths, place_at, relative_distance
 from ...geometry.vectors import TINY, dot
 from ..axis.fit import FIT_STAY, axis_box
-from ..axis.sections import SURFACE_FIT, VertexPoints
-from ..topology.collapse import merge_into, with_fields, with_gaps
-from ..topology.limbs import AXIS_LEAVES, AXIS_LENGTH, Limbs, Line
+from ..axis.sections import SURFACE_FIT
+from ..curve import Curve
+from ..limbs import AXIS_LEAVES, AXIS_LENGTH, JunctionLimbs, Line
+from ..merging import merge_into
 from .handles import Handles
 
 # All fitted, but for the steps.
@@ -30,7 +29,7 @@ class _Place(NamedTuple):
 
     place: np.ndarray
     radius: float  # of the sphere that touches the surface there
-    lines: list[Line]  # of its limbs, as in `Limbs.at`
+    lines: list[Line]  # of its limbs, as in `JunctionLimbs.at`
 
 
 def move_junctions(curve: Curve) -> Curve:
@@ -51,7 +50,7 @@ def move_junctions(curve: Curve) -> Curve:
         return curve
     known = dict[bytes, _Place]()
     while True:
-        limbs = Limbs(curve)
+        limbs = JunctionLimbs(curve)
         places = _places(curve, limbs, known)
         merged = _merged(curve, limbs, places)
         if merged is None:
@@ -59,13 +58,13 @@ def move_junctions(curve: Curve) -> Curve:
         curve = merged
     if curve.n_loops and len(curve.supporting_points):
         handles = Handles(curve)
-        limbs = Limbs(curve, handles.bodies)
+        limbs = JunctionLimbs(curve, handles.bodies)
         places = _places(curve, limbs, known, handles)
     return _straightened(curve, limbs, places)
 
 
 def _places(
-    curve: Curve, limbs: Limbs, known: dict[bytes, _Place], handles: Handles | None = None
+    curve: Curve, limbs: JunctionLimbs, known: dict[bytes, _Place], handles: Handles | None = None
 ) -> dict[int, _Place]:
     """Where every junction belongs, if that is not known of the same limbs from before others were merged."""
     cloud = handles.cloud if handles else curve.cloud
@@ -106,7 +105,7 @@ def _places(
     return found
 
 
-def _merged(curve: Curve, limbs: Limbs, places: dict[int, _Place]) -> Curve | None:
+def _merged(curve: Curve, limbs: JunctionLimbs, places: dict[int, _Place]) -> Curve | None:
     """Merge pairs of junctions, each the other's nearest, that a branch joins and a radius parts; None if none are."""
     ends = [tuple(sorted(branch[[0, -1]].tolist())) for branch in limbs.branches]
     near: dict[int, tuple[float, int]] = {}
@@ -129,7 +128,7 @@ def _merged(curve: Curve, limbs: Limbs, places: dict[int, _Place]) -> Curve | No
     return merged if merged.n_loops == curve.n_loops else None
 
 
-def _straightened(curve: Curve, limbs: Limbs, places: dict[int, _Place]) -> Curve:
+def _straightened(curve: Curve, limbs: JunctionLimbs, places: dict[int, _Place]) -> Curve:
     """Put junctions in their places, and the disturbed parts of limbs on straight lines from there."""
     vertices, radii = curve.vertices.copy(), curve.radii.copy()
     confidence, owner = curve.confidence.copy(), curve.vertex_of_point.copy()
@@ -199,9 +198,9 @@ def limb_line(
     n = max(int(np.ceil(along[-1] / step)), 8)
     step, half = along[-1] / n, n // 2
     at = (np.arange(n) + 0.5) * step
-    curve, clear = place_at(places, along, at), np.ones(n)
+    middles, clear = place_at(places, along, at), np.ones(n)
     if others:
-        left, _ = relative_distance(curve, vertices, surface, others)
+        left, _ = relative_distance(middles, vertices, surface, others)
         clear = np.clip((left - 1) / (2 * (AXIS_LEAVES - 1)), 0, 1)
         clear[:half] = np.minimum.accumulate(clear[:half][::-1])[::-1]  # what left and came back had not left
     start = float((1 - clear[:half]).sum() * step)
@@ -211,10 +210,10 @@ def limb_line(
     if total * step <= 0:
         return Line(anchor, np.zeros(3), 0.0, 0.0, start, anchor[None], radius)
     weight /= total
-    middle, mean = weight @ curve, weight @ at
-    way = (weight * (mean - at)) @ (curve - middle)
+    middle, mean = weight @ middles, weight @ at
+    way = (weight * (mean - at)) @ (middles - middle)
     way /= max(np.linalg.norm(way), TINY)
-    off = curve - middle - (mean - at)[:, None] * way
+    off = middles - middle - (mean - at)[:, None] * way
     spread, bend = np.sqrt(weight @ (at - mean) ** 2), np.sqrt(weight @ dot(off, off))
     return Line(middle, way, float(spread), float(bend), start, anchor[None], radius)
 

@@ -3,29 +3,27 @@
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
-from ..curve import Curve
 from ...geometry.groups import group_sum
 from ...geometry.near_links import linked
 from ...geometry.neighbourhoods import nearest_neighbours
 from ...geometry.vectors import TINY, norm
-from ..axis.sections import Sections, VertexPoints, measure_sections
+from ..curve import Curve
 from ..diagnostics import MAJORITY, STUB_LENGTH
-from ..topology.collapse import with_fields
-from ..topology.evidence import SurfaceGraph
+from ..surface import Surface
 
 # fitted: half width of a wide end over that of its neck, and of a body over that of its handle, at least; with 2 (ends)
 # and 4 (handles) the scores are the same
 WIDE_NECK = 3.0
 
 
-def level_wide_ends(curve: Curve, surface: SurfaceGraph) -> Curve:
+def level_wide_ends(curve: Curve, surface: Surface) -> Curve:
     """Move the vertices of wide ends to the means of bands of the surface that are equally far from the neck.
 
     A disc has no axis: every way through it is in the middle of its own sections, so that a fit leaves it as it is. Nor
     is the way ahead told by the limb, which meets a pan at an angle. The bands know the way from the neck to the rim,
     and their means hardly depend on the points. Balls on a neck are wide ends, too.
     """
-    width = half_widths(curve.cloud, curve.sections)
+    width = half_widths(curve)
     leaf = curve.degree == 1
     for branch in curve.branches:
         for path in (branch, branch[::-1]):
@@ -34,13 +32,13 @@ def level_wide_ends(curve: Curve, surface: SurfaceGraph) -> Curve:
     return curve
 
 
-def half_widths(cloud: VertexPoints, sections: Sections) -> np.ndarray:
+def half_widths(curve: Curve) -> np.ndarray:
     """Half width of the section at every vertex, or the distance to its points or those beside it, (M,) float array.
 
     Where normals mean nothing, as on scan lines, points are farther away than the half width.
     """
-    away, (a, b) = cloud.distance, cloud.curve.edges.T
-    width = np.fmax(sections.half_width, away)
+    away, (a, b) = curve.cloud.distance, curve.edges.T
+    width = np.fmax(curve.sections.half_width, away)
     np.maximum.at(width, np.concatenate([a, b]), away[np.concatenate([b, a])])
     return width
 
@@ -64,7 +62,7 @@ def _wide_end(path: np.ndarray, vertices: np.ndarray, width: np.ndarray, other: 
     return path[neck:] if len(path) - neck > 3 else path[:0]
 
 
-def _levelled(curve: Curve, run: np.ndarray, surface: SurfaceGraph) -> Curve:
+def _levelled(curve: Curve, run: np.ndarray, surface: Surface) -> Curve:
     """The curve with a run, whose first two vertices are the neck and stay, at the means of bands behind it."""
     vertex, k = curve.vertex_of_point[surface.supporting], surface.neighbours.shape[1]
     rows = np.flatnonzero(np.isin(vertex, run))

@@ -2,30 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..curve import Curve
+from ...data.graph import all_of_vertices
 from ...geometry.near_links import spanning
 from ...geometry.vectors import norm
+from ..curve import Curve
 from ..diagnostics import MAJORITY
-from ..topology.air import CROSSING_HOPS
-from ..topology.collapse import some_vertices
+from ..topology.false_branches import CROSSING_HOPS
 from .detect import REGION_VERTICES, UNSURE_CONFIDENCE, SpacedPoints, mostly_on_loops, without_surface
 
 
-class Aside(NamedTuple):
-    """What of a curve was set aside."""
+class Deferred(NamedTuple):
+    """What of a curve is left to a Tracer."""
 
     whole: Curve
     gone: np.ndarray  # (M,) bool, its vertices without a surface
     rows: np.ndarray  # input points of the others
 
     @classmethod
-    def of(cls, curve: Curve, least: float) -> Aside | None:
+    def of(cls, curve: Curve, least: float) -> Deferred | None:
         """The parts that a Tracer will trace, if they have most points of a large curve, such as a tree's crown.
 
         No surface around them says anything, and there are thousands of them to be asked about. `least` is as in
@@ -46,9 +45,13 @@ class Aside(NamedTuple):
         """What is left, with its points alone."""
         whole, left, rows = self.whole, ~self.gone, self.rows
         number = np.cumsum(left) - 1
-        made = dict(points=whole.points[rows], normals=whole.normals[rows])
-        made |= dict(vertex_of_point=number[whole.vertex_of_point[rows]], **some_vertices(whole, left))
-        return replace(whole, edges=number[whole.edges[left[whole.edges].all(axis=1)]], **made)
+        return whole.changed(
+            **all_of_vertices(whole, left),
+            edges=number[whole.edges[left[whole.edges].all(axis=1)]],
+            vertex_of_point=number[whole.vertex_of_point[rows]],
+            points=whole.points[rows],
+            normals=whole.normals[rows],
+        )
 
     def put_back(self, rest: Curve) -> Curve:
         """The refined rest, and behind its vertices those set aside, as trees tied to where it is nearest."""
@@ -63,9 +66,14 @@ class Aside(NamedTuple):
             ties = ties[spanning(piece, ties, norm(whole.vertices[ends[:, 1]] - whole.vertices[ends[:, 0]]))]
         owner = np.where(whole.vertex_of_point >= 0, number[whole.vertex_of_point], -1)
         owner[self.rows] = rest.vertex_of_point
-        aside, made = some_vertices(whole, gone), dict[str, Any](points=whole.points, normals=whole.normals)
-        made |= {name: np.concatenate([getattr(rest, name), aside[name]]) for name in ("vertices", *OF_VERTICES)}
-        return replace(rest, **made, edges=np.concatenate([rest.edges, ties]), vertex_of_point=owner)
+        inside, outside = all_of_vertices(rest), all_of_vertices(whole, gone)
+        return rest.rewired(
+            np.concatenate([rest.edges, ties]),
+            **{name: np.concatenate([inside[name], outside[name]]) for name in inside},
+            vertex_of_point=owner,
+            points=whole.points,
+            normals=whole.normals,
+        )
 
 
 def _most(cloud: SpacedPoints, some: np.ndarray) -> bool:

@@ -6,8 +6,8 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from ...data.graph import Graph
 from ...data.points import RIDGE_NEIGHBOURS, noise_share
-from ..curve import Curve
 from ...geometry.cycles import edges_on_cycles
 from ...geometry.eigen import largest_eigenvalue
 from ...geometry.grid_sampling import SAMPLED_POINTS, sample_cloud
@@ -17,9 +17,11 @@ from ...geometry.neighbourhoods import nearest_neighbours, principal
 from ...geometry.vectors import COLUMNS, ROWS, TINY
 from ...geometry.winding import AREA_NEIGHBOURS
 from ..axis.sections import VertexPoints
+from ..curve import Curve
 from ..diagnostics import MAJORITY, SHEET_SHARE, STUB_LENGTH
-from ..topology.collapse import drop_vertices, with_fields
+from ..merging import drop_vertices
 
+LEAST_SURFACE = 0.65  # fitted: share of the points of a region with a surface that show one
 SAME_PLACE = 1e-6  # derived: share of the cloud's extent below which points are not apart
 LEAST_POINTS = 64  # fitted: of which fewer say nothing about where there is no surface
 SURFACE_GROWTH = 2.5  # measured: growth of links on a surface; noise that fills space has more, a curve 1.7
@@ -39,7 +41,7 @@ class SpacedPoints(VertexPoints):
     @cached_property
     def rows(self) -> np.ndarray:
         """Which input points they are."""
-        points, some = self.curve.points, np.flatnonzero(self.curve.vertex_of_point >= 0)
+        points, some = self.graph.points, np.flatnonzero(self.graph.vertex_of_point >= 0)
         if len(some):
             some = some[sample_cloud(points[some], SAMPLED_POINTS)[0]]
         wide = np.ptp(points[some], axis=0).max() if len(some) else 0.0
@@ -72,7 +74,7 @@ def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
     points of a region, it is so. Where the confidence is unknown there is a surface. If more than `least` of all these
     points fill space, they are no twigs, but a part scattered as thick as it is wide, and there are no such vertices.
     """
-    curve, m = cloud.curve, len(cloud.curve.vertices)
+    curve, m = cloud.graph, len(cloud.graph.vertices)
     thin = curve.confidence < UNSURE_CONFIDENCE
     if not may_lack_surface(curve, least) or len(cloud.rows) < LEAST_POINTS:
         return np.zeros(m, bool)
@@ -87,7 +89,7 @@ def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
     return thin & (not thin.any() or bool(cloud.scattered[thin[vertex]].mean() <= least))
 
 
-def without_strays(curve: Curve) -> Curve:
+def without_detached_clumps(curve: Curve) -> Curve:
     """The same without vertices that nothing is joined to and that have few points: clumps of flying ones, outliers.
 
     They are fewer than `LEAST_POINTS`, and than half of those of the largest component. Some edge must be left.
@@ -109,7 +111,7 @@ def without_strays(curve: Curve) -> Curve:
     return drop_vertices(curve.changed(normals=normals, report=report), strays)
 
 
-def may_lack_surface(curve: Curve, least: float) -> bool:
+def may_lack_surface(curve: Graph, least: float) -> bool:
     """Whether vertices that are not sure where the axis is have so many points that one region may lack a surface."""
     if curve.report.n_mixed:  # then a part thinner than a pixel would be nothing but mixed pixels
         return False
@@ -118,7 +120,7 @@ def may_lack_surface(curve: Curve, least: float) -> bool:
     return bool(count[curve.confidence < UNSURE_CONFIDENCE].sum() > (1 - least) * min(REGION_POINTS, count.sum()))
 
 
-def mostly_on_loops(curve: Curve, thin: np.ndarray) -> bool:
+def mostly_on_loops(curve: Graph, thin: np.ndarray) -> bool:
     """Whether most of some vertices are on loops, as in a frame of thin bars: from its root, paths would open all."""
     edges = curve.edges
     looped = edges_on_cycles(len(thin), edges)
@@ -144,7 +146,7 @@ def _share_around(near: np.ndarray, count: np.ndarray, some: np.ndarray) -> np.n
     return (points * some[near]).sum(axis=1) / np.maximum(points.sum(axis=1), 1)
 
 
-def _surely_with_surface(curve: Curve) -> np.ndarray:
+def _surely_with_surface(curve: Graph) -> np.ndarray:
     """Vertices in stretches that surely have a surface, and are long for their radius."""
     m, ends, sure = len(curve.vertices), curve.edges, curve.confidence > SURE_CONFIDENCE
     inside = sure[ends].all(axis=1)

@@ -11,14 +11,14 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
-from ..curve import Curve
 from ...geometry.groups import component_labels, group_median
 from ...geometry.near_links import LINK_SPACINGS, join_pieces, linked, slice_centres, steps
 from ...geometry.polylines import incident_edges, nearest_on_edges, places_on_edges
 from ...geometry.vectors import dot, norm, unit
-from ..topology.collapse import merge_into, with_gaps
-from .detect import SAME_PLACE, SpacedPoints, mostly_on_loops, without_strays, without_surface
-from .rooted import numbered_from, root_among
+from ..curve import Curve
+from ..merging import merge_into
+from ..rooted import numbered_from, root_among
+from .detect import SAME_PLACE, SpacedPoints, mostly_on_loops, without_detached_clumps, without_surface
 
 # All fitted, on trees whose twigs are thinner than their points are far apart; s is the median scale of the points.
 SLICE_WIDTH = 0.5  # of geodesic distance, over s
@@ -59,16 +59,16 @@ def trace(curve: Curve, surface: float, root: str | None) -> Curve:
         stays = np.arange(len(paths.nodes))
     point = paths.nodes[stays] < mixed.n
     if point.any() and len(traced.edges):
-        traced = replace(traced, radii=np.where(point, thickness_around(traced), traced.radii))
+        traced = traced.changed(radii=np.where(point, thickness_around(traced), traced.radii))
     loose = thin[curve.vertex_of_point] & (curve.vertex_of_point >= 0)
     traced = traced.with_gaps(mixed.places[joined])
     report = replace(traced.report, n_traced=int(loose.sum()))
     if root is None:
-        traced = without_strays(traced)
+        traced = without_detached_clumps(traced)
     else:
         traced = numbered_from(traced, int(np.searchsorted(stays, paths.index[roots[0]])))
         report = replace(report, root=tuple(traced.vertices[0].tolist()))
-    return replace(traced, normals=np.where(loose[:, None], np.nan, traced.normals), report=report)
+    return traced.changed(normals=np.where(loose[:, None], np.nan, traced.normals), report=report)
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,11 +188,10 @@ def _assembled(curve: Curve, mixed: _Mixed, paths: _Paths, tree: bool) -> Curve:
     stays = mixed.vertices[nodes[~point] - mixed.n]
     radii[~point], confidence[~point] = curve.radii[stays], curve.confidence[stays]
     edges = np.unique(np.sort(edges, axis=1), axis=0)
-    made = dict(vertices=vertices, edges=edges, radii=radii, confidence=confidence, vertex_of_point=vertex)
-    traced = with_gaps(curve.changed(**NOT_MEASURED | made), vertices[met])
+    traced = curve.rewired(edges, vertices=vertices, radii=radii, confidence=confidence, vertex_of_point=vertex)
     if point.any() and len(edges):
-        traced = replace(traced, radii=np.where(point, spread_around(traced), radii))
-    return traced
+        traced = traced.changed(radii=np.where(point, spread_around(traced), radii))
+    return traced.with_gaps(vertices[met])
 
 
 def _meetings(vertices: np.ndarray, edges: np.ndarray, tips: np.ndarray, scale: float) -> np.ndarray:
@@ -247,9 +246,7 @@ def _distances(curve: Curve) -> tuple[np.ndarray, np.ndarray]:
     return np.repeat(away, np.diff(around.indptr)), around.indices
 
 
-def drop_spurious(
-    curve: Curve, traced: np.ndarray, radii: float, root: int | None = None
-) -> tuple[Curve, np.ndarray]:
+def drop_spurious(curve: Curve, traced: np.ndarray, radii: float, root: int | None = None) -> tuple[Curve, np.ndarray]:
     """Drop twigs whose tip is as near to the rest as points scatter there; say which vertices stay, in their order.
 
     Of N points that scatter normally around a curve, with a median distance of r, one is expected to be farther off

@@ -1,21 +1,20 @@
-"""Bridge the gaps that a scan or the contraction leaves in an object."""
+"""Gaps that a scan or the contraction leaves: across which does the object go on?"""
 
-from collections.abc import Iterator
-from dataclasses import replace
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
-from ...data.decisions import QUESTIONS, Decision
-from ..curve import Curve
+from ...data.decisions import logistic
 from ...geometry.groups import quantile
 from ...geometry.near_links import linked
 from ...geometry.polylines import arc_lengths
 from ...geometry.vectors import TINY, dot, norm
-from .air import HEADING_RADII
-from .collapse import with_gaps
-from .evidence import LEAST_INSIDE, Evidence
+from ..curve import Curve
+from ..surface import LEAST_INSIDE, Evidence, Surface
+from .false_branches import HEADING_RADII
+from .question import Candidate, Question
 from .spurs import NOT_BESIDE
 
 # All fitted but where it says otherwise.
@@ -32,39 +31,45 @@ class _End(NamedTuple):
     radius: float
 
 
-def bridge_gaps(curve: Curve, evidence: Evidence, least: float) -> tuple[Curve, list[Decision]]:
-    """Join ends with other ends, or with the side of something, where the object probably goes on; the surest first.
+class Gaps(Question):
+    """Which ends go on across a gap, to other ends or to the side of something? An edge bridges it.
 
-    A gap is bridged by an edge from a probability of `least` on. There is one decision for each end that points at
-    something, of its likeliest bridge.
+    The surest are bridged first. There is one decision for each end that points at something, of its likeliest bridge.
     """
-    found = [(QUESTIONS["gap"].probability(facts), pair) for pair, facts in gap_facts(curve, evidence)]
-    used: set[int] = set()
-    decisions, bridges = [], []
-    for chance, pair in sorted(found, key=lambda each: -each[0]):
-        if used.isdisjoint(pair):
-            place = curve.vertices[list(pair)].mean(axis=0)
-            decisions.append(Decision("gap", tuple(place.tolist()), chance, chance >= least))
-            used.update(pair)
-            if chance >= least:
-                bridges.append(sorted(pair))
-    if not bridges:
-        return curve, decisions
-    bridged = curve.changed(edges=np.unique(np.concatenate([curve.edges, bridges]), axis=0))
-    return bridged.with_gaps(curve.vertices[np.array(bridges)]), decisions
+
+    about, option, repeats = "gap", "bridge", False
+    weights: ClassVar[Mapping[str, float]] = dict(constant=-1.7, winding=3.7, cap=-1.2)  # fitted
+
+    def candidates(self, evidence: Evidence, least: float) -> list[Candidate]:
+        """One for each end, see `gap_facts`, the likeliest first."""
+        asked = [(logistic(self.weights, facts), pair, facts) for pair, facts in gap_facts(evidence)]
+        answers, used = list[Candidate](), set[int]()
+        for probability, pair, facts in sorted(asked, key=lambda each: -each[0]):
+            if used.isdisjoint(pair):
+                used.update(pair)
+                place = evidence.curve.vertices[list(pair)].mean(axis=0)
+                answers.append(Candidate(sorted(pair), place, facts, probability, probability >= least))
+        return answers
+
+    def change(self, evidence: Evidence, chosen: Sequence[Candidate]) -> Curve:
+        """Add the bridges."""
+        curve, bridges = evidence.curve, np.array([candidate.part for candidate in chosen])
+        edges = np.unique(np.concatenate([curve.edges, bridges]), axis=0)
+        return curve.changed(edges=edges).with_gaps(curve.vertices[bridges])
 
 
-def gap_facts(curve: Curve, evidence: Evidence) -> Iterator[tuple[tuple[int, int], dict[str, float]]]:
+def gap_facts(evidence: Evidence) -> Iterator[tuple[tuple[int, int], dict[str, float]]]:
     """What speaks for and against a bridge, for every end and the places that it points at: (leaf, vertex), and facts.
 
     The facts are: the least winding number along the bridge, over the median on the curve; and how far the end is
     closed: the flux of its outward normals through its cross-section, 1 for a cap and 0 for a tube cut open, as a
     logarithm.
     """
+    curve, surface = evidence.curve, evidence.surface
     ends = list(_ends(curve))
-    if not ends or not len(evidence.points):
+    if not ends or not len(surface.points):
         return
-    typical = quantile(evidence.winding_along(curve))
+    typical = quantile(evidence.winding)
     if typical < LEAST_INSIDE:
         return  # parts too thin to have an inside, which could go on across a gap
     leaves = [end.leaf for end in ends]
@@ -74,9 +79,9 @@ def gap_facts(curve: Curve, evidence: Evidence) -> Iterator[tuple[tuple[int, int
         return
     across = [curve.vertices[other] - end.place for end, other in found]
     samples = [end.place + BRIDGE_SAMPLES * way for (end, *_), way in zip(found, across, strict=True)]
-    winding = evidence.winding(np.concatenate(samples)).reshape(len(found), -1).min(axis=1) / typical
+    winding = surface.winding(np.concatenate(samples)).reshape(len(found), -1).min(axis=1) / typical
     for (end, other), least in zip(found, winding, strict=True):
-        facts = dict(winding=float(np.clip(least, -0.5, 1.3)), cap=float(np.log(_cap(end, evidence) + 0.1)))
+        facts = dict(winding=float(np.clip(least, -0.5, 1.3)), cap=float(np.log(_cap(end, surface) + 0.1)))
         yield (end.leaf, other), facts
 
 
@@ -98,15 +103,15 @@ def _aims(curve: Curve, end: _End, travelled: np.ndarray, leaves: list[int], alo
             yield int(some[np.argmin(cost[some])])
 
 
-def _cap(end: _End, evidence: Evidence) -> float:
+def _cap(end: _End, surface: Surface) -> float:
     """Flux of the normals that look out of an end, through its cross-section, at least 0."""
-    offset = evidence.points - end.place
+    offset = surface.points - end.place
     ahead = offset @ end.outward
     beside = dot(offset, offset) - ahead**2
     near = (ahead > -end.radius) & (ahead < NOT_BESIDE * end.radius)
     near &= beside < (NOT_BESIDE * end.radius) ** 2
-    facing = np.maximum(evidence.normals[near] @ end.outward, 0)
-    return float(evidence.areas[near] @ facing / max(np.pi * end.radius**2, TINY))
+    facing = np.maximum(surface.normals[near] @ end.outward, 0)
+    return float(surface.areas[near] @ facing / max(np.pi * end.radius**2, TINY))
 
 
 def _ends(curve: Curve) -> Iterator[_End]:

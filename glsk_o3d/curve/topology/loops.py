@@ -1,24 +1,26 @@
-"""Close loops that nothing passes through."""
+"""Loops: which are handles of the object?"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...data.decisions import QUESTIONS, Decision
-from ..curve import Curve
+from ...data.decisions import logistic
 from ...geometry.cycles import minimum_cycle_basis, places_inside
 from ...geometry.groups import component_labels, group_rank, quantile
 from ...geometry.near_links import link_growth
 from ...geometry.polylines import arc_lengths
 from ...geometry.vectors import TINY
+from ..curve import Curve
 from ..diagnostics import MAJORITY
+from ..merging import collapse_triangles, drop_edges, merge_vertices
+from ..surface import LEAST_INSIDE, Evidence, Memo, Surface
 from ..thin.detect import SURFACE_GROWTH, UNSURE_CONFIDENCE, SpacedPoints
-from .collapse import collapse_triangles, drop_edges, merge_vertices
-from .evidence import LEAST_INSIDE, Evidence, ask_once
+from .question import Candidate, Question
 
 WIDE_LOOP = 1.4  # fitted: surface distances, the radius of a loop that is more than two strands in one part
 WIDE_OPEN = 6.0  # fitted: spacings, its radius beyond which that says no more: crowns have wide false loops
@@ -29,52 +31,67 @@ WIRES_ON_LOOPS = 0.9  # fitted: share of what has no surface that is on wide loo
 WALL_SECTORS = 16  # precision: directions around a place in which walls are looked for
 
 
-def close_loops(curve: Curve, evidence: Evidence, least: float) -> tuple[Curve, list[Decision]]:
-    """Close the loops that are handles with a probability of less than `least`, until there are none.
+class Loops(Question):
+    """Which loops are handles of the object? Others are closed, until there are none.
 
     Narrow ones, two strands in one part, are collapsed; wide ones are cut where the fewest bonds cross. Those that
     share a vertex with one that is cut are asked about later, if they are still there. There is one decision for each
-    loop that was closed, and for each of the minimum cycle basis that is left.
+    loop that was closed, and for each of the minimum cycle basis that remains.
     """
-    decisions: list[Decision] = []
-    known, wires = dict[bytes, LoopEvidence](), None
-    while True:
+
+    about, option, repeats = "loop", "handle", True
+    weights: ClassVar[Mapping[str, float]] = dict(constant=-0.3, opening=1.5, passage=4.5, bonds=2.4)  # fitted
+
+    def __init__(self) -> None:
+        self._known = Memo[LoopFacts]()
+        self._wires: bool | None = None
+
+    def candidates(self, evidence: Evidence, least: float) -> list[Candidate]:
+        """One for each loop of the minimum cycle basis that no cut may open, see `loop_facts`."""
+        curve, surface = evidence.curve, evidence.surface
         cycles = minimum_cycle_basis(len(curve.vertices), curve.edges, curve.edge_lengths)
-        names, tubes = [curve.vertices[cycle].tobytes() for cycle in cycles], evidence.tubes(curve, cycles)
-        narrow = [evidence.circle(curve.vertices[c])[1] < WIDE_LOOP * t for c, t in zip(cycles, tubes, strict=True)]
-        members = [set() if slim else set(c.tolist()) for c, slim in zip(cycles, narrow, strict=True)]
-        wires = _is_frame_of_wires(curve, [*set[int]().union(*members)]) if wires is None else wires
-        loops, cut, used, left = dict[int, LoopEvidence](), [], set[int](), [*range(len(cycles))]
-        while left:  # each waits for those before it; two cuts in what two loops share would tear a piece out of it
+        keys, thickness = [curve.vertices[cycle].tobytes() for cycle in cycles], evidence.thickness(cycles)
+        radii = [surface.circle(curve.vertices[cycle])[1] for cycle in cycles]
+        narrow = [radius < WIDE_LOOP * thick for radius, thick in zip(radii, thickness, strict=True)]
+        members = [set() if slim else set(cycle.tolist()) for cycle, slim in zip(cycles, narrow, strict=True)]
+        if self._wires is None:
+            self._wires = _is_frame_of_wires(curve, [*set[int]().union(*members)])
+        answers, used, remaining = dict[int, Candidate](), set[int](), [*range(len(cycles))]
+        while remaining:  # each waits for those before it: cuts in what two share would tear a piece out
             asked, waiting, before = list[int](), list[int](), set[int]()
-            for i in left:
+            for i in remaining:
                 (asked if before.isdisjoint(members[i]) else waiting).append(i)
                 before |= members[i]
-            ask = partial(loop_facts, curve, evidence=evidence)
-            answers = ask_once(known, [names[i] for i in asked], [cycles[i] for i in asked], ask)
-            for i, loop in zip(asked, answers, strict=True):
-                if wires and (curve.confidence[cycles[i]] < UNSURE_CONFIDENCE).mean() > MAJORITY:
+            facts = partial(loop_facts, evidence=evidence)
+            answered = self._known.of([keys[i] for i in asked], [cycles[i] for i in asked], facts)
+            for i, loop in zip(asked, answered, strict=True):
+                if self._wires and (curve.confidence[cycles[i]] < UNSURE_CONFIDENCE).mean() > MAJORITY:
                     loop = loop.without_normals()
-                loops[i] = loop
-                if loop.probability < least and not narrow[i]:
-                    cut.append(np.sort(cycles[i][[loop.weakest, (loop.weakest + 1) % len(cycles[i])]]))
+                probability = logistic(self.weights, loop.facts) * loop.certainty
+                part = cycles[i], narrow[i], loop.weakest
+                answers[i] = Candidate(part, loop.centre, loop.facts, probability, probability < least)
+                if answers[i].changes:
                     used |= members[i]
-            left = [i for i in waiting if used.isdisjoint(members[i])]
-        rows = [(i, loop, loop.probability < least) for i, loop in sorted(loops.items())]
-        found = [Decision("loop", tuple(loop.centre.tolist()), loop.probability, false) for _, loop, false in rows]
-        decisions += [each for each in found if each.changed]
-        closed = [cycles[i] for i, _, false in rows if false and narrow[i]]
-        if not closed and not cut:
-            return curve, decisions + found
+            remaining = [i for i in waiting if used.isdisjoint(members[i])]
+        return [answer for _, answer in sorted(answers.items())]
+
+    def change(self, evidence: Evidence, chosen: Sequence[Candidate]) -> Curve:
+        """Collapse the narrow loops, and cut the wide ones."""
+        curve, pairs, cut = evidence.curve, list[np.ndarray](), list[np.ndarray]()
+        for cycle, narrow, weakest in (candidate.part for candidate in chosen):
+            if narrow:
+                pairs.append(facing_pairs(curve.vertices[cycle], cycle))
+            else:
+                cut.append(np.sort(cycle[[weakest, (weakest + 1) % len(cycle)]]))
         if cut:
             curve = drop_edges(curve, cut)
-        if closed:
-            pairs = np.concatenate([facing_pairs(curve.vertices[cycle], cycle) for cycle in closed])
-            labels = component_labels(len(curve.vertices), pairs)
+        if pairs:
+            labels = component_labels(len(curve.vertices), np.concatenate(pairs))
             curve = collapse_triangles(merge_vertices(curve, labels))
+        return curve
 
 
-class LoopEvidence(NamedTuple):
+class LoopFacts(NamedTuple):
     """What speaks for and against that a loop is a handle."""
 
     facts: dict[str, float]
@@ -83,11 +100,11 @@ class LoopEvidence(NamedTuple):
     weakest: int  # position of the edge, from there to the next vertex, that the fewest bonds cross
 
     @property
-    def probability(self) -> float:
-        """That it is one: what the facts say, and less where it has little inside, nothing as in sparse crowns."""
-        return QUESTIONS["loop"].probability(self.facts) * float(np.clip(2 * self.inside / LEAST_INSIDE - 1, 0, 1))
+    def certainty(self) -> float:
+        """A factor of the probability: less where the loop has little inside, nothing as in sparse crowns."""
+        return float(np.clip(2 * self.inside / LEAST_INSIDE - 1, 0, 1))
 
-    def without_normals(self) -> LoopEvidence:
+    def without_normals(self) -> LoopFacts:
         """The same with bonds all around, and something inside."""
         return self._replace(facts=self.facts | dict(bonds=float(np.log(1 + 0.1))), inside=LEAST_INSIDE)
 
@@ -101,7 +118,7 @@ def _is_frame_of_wires(curve: Curve, wide: list[int]) -> bool:
     return bool(np.median(link_growth(cloud.links)[thin[cloud.vertex]]) < SURFACE_GROWTH)
 
 
-def loop_facts(curve: Curve, cycles: list[np.ndarray], evidence: Evidence) -> list[LoopEvidence]:
+def loop_facts(cycles: list[np.ndarray], evidence: Evidence) -> list[LoopFacts]:
     """What speaks for and against that each of some loops is a handle.
 
     The facts are logarithms: of the radius of the largest circle inside it, in spacings of the points, at most six; of
@@ -115,14 +132,15 @@ def loop_facts(curve: Curve, cycles: list[np.ndarray], evidence: Evidence) -> li
     """
     if not cycles:
         return []
-    bonds, spacing = evidence.bonds(curve), max(evidence.spacing, TINY)
-    loops, tubes = [curve.vertices[cycle] for cycle in cycles], evidence.tubes(curve, cycles)
-    views = [_View(loop, tube, evidence) for loop, tube in zip(loops, tubes, strict=True)]
+    curve, surface = evidence.curve, evidence.surface
+    bonds, spacing = evidence.bonds, max(surface.spacing, TINY)
+    loops, thickness = [curve.vertices[cycle] for cycle in cycles], evidence.thickness(cycles)
+    views = [_View(loop, thick, surface) for loop, thick in zip(loops, thickness, strict=True)]
     vertices, which = np.unique(np.concatenate(cycles), return_inverse=True)  # loops of a lattice share most of theirs
-    along = evidence.winding_at(curve.vertices[vertices])[which]
+    along = surface.winding_at(curve.vertices[vertices])[which]
     medians = [quantile(each) for each in np.split(along, np.cumsum([len(loop) for loop in loops[:-1]]))]
-    falls = _falls(views, np.array(medians), evidence)
-    found = []
+    falls = _falls(views, np.array(medians), surface)
+    answers = []
     for cycle, view, inside, fall in zip(cycles, views, medians, falls, strict=True):
         crossing = crossings(positions(cycle, len(curve.vertices)), len(cycle), bonds, closed=True)
         best = int(np.argmax(view.sight * fall))
@@ -132,8 +150,8 @@ def loop_facts(curve: Curve, cycles: list[np.ndarray], evidence: Evidence) -> li
             passage=float(np.log(passage + 0.3)),
             bonds=float(np.log(crossing.min() / max(quantile(crossing), TINY) + 0.1)),
         )
-        found.append(LoopEvidence(facts, inside, view.centre, int(np.argmin(crossing))))
-    return found
+        answers.append(LoopFacts(facts, inside, view.centre, int(np.argmin(crossing))))
+    return answers
 
 
 class _View:
@@ -149,14 +167,14 @@ class _View:
         Radius of the widest cylinder without points that stands on each.
     """
 
-    def __init__(self, loop: np.ndarray, tube: float, evidence: Evidence) -> None:
-        self.centre, self.radius = evidence.circle(loop)
+    def __init__(self, loop: np.ndarray, thickness: float, surface: Surface) -> None:
+        self.centre, self.radius = surface.circle(loop)
         self.places, axes = places_inside(loop, LOOP_GRID)
         if not len(self.places):
             self.places = self.centre[None]
-        self._places, self._evidence, self._axes = (self.places - self.centre) @ axes[:2].T, evidence, axes
-        extent = np.linalg.norm(loop - self.centre, axis=1).max() + tube
-        self._half = self.radius + tube  # of what stands in the way, along the normal
+        self._places, self._surface, self._axes = (self.places - self.centre) @ axes[:2].T, surface, axes
+        extent = np.linalg.norm(loop - self.centre, axis=1).max() + thickness
+        self._half = self.radius + thickness  # of what stands in the way, along the normal
         self._reaches = iter((extent, 2 * extent, np.inf))
         self._see()
         while (self.sight > self._clear).any():
@@ -165,10 +183,10 @@ class _View:
     def _see(self) -> None:
         """Take up points farther from the centre in the plane: from each place all in a circle, which is `_clear`."""
         reach = next(self._reaches)
-        rows = self._evidence.near(self.centre, float(np.hypot(reach, self._half)))
-        points = (self._evidence.points[rows] - self.centre) @ self._axes.T
+        rows = self._surface.near(self.centre, float(np.hypot(reach, self._half)))
+        points = (self._surface.points[rows] - self.centre) @ self._axes.T
         near = np.abs(points[:, 2]) < self._half
-        self._points, self._normals = points[near, :2], self._evidence.normals[rows[near]] @ self._axes[:2].T
+        self._points, self._normals = points[near, :2], self._surface.normals[rows[near]] @ self._axes[:2].T
         self.sight = np.full(len(self.places), np.inf if reach < np.inf else 0.0)
         if near.any():
             self.sight = cKDTree(self._points).query(self._places)[0]
@@ -189,7 +207,7 @@ class _View:
         return float(cosine.sum() / WALL_SECTORS)
 
 
-def _falls(views: list[_View], inside: np.ndarray, evidence: Evidence) -> list[np.ndarray]:
+def _falls(views: list[_View], inside: np.ndarray, surface: Surface) -> list[np.ndarray]:
     """By what share the winding number falls from that `inside` each loop to the places that it is seen through.
 
     Those with the widest sight are asked first, and of the others only those whose sight could make them the best; the
@@ -197,16 +215,16 @@ def _falls(views: list[_View], inside: np.ndarray, evidence: Evidence) -> list[n
     """
     places, sight = (np.concatenate([getattr(view, name) for view in views]) for name in ("places", "sight"))
     sizes = [len(view.places) for view in views]
-    loop, fall, left = np.repeat(np.arange(len(views)), sizes), np.zeros(len(places)), np.ones(len(places), bool)
+    loop, fall, unasked = np.repeat(np.arange(len(views)), sizes), np.zeros(len(places)), np.ones(len(places), bool)
     order = np.lexsort([-sight, loop])
     first = order[group_rank(loop, len(views)) < WIDEST_FIRST]
     for _ in range(2):
-        left[first] = False
-        there = evidence.winding(places[first])
+        unasked[first] = False
+        there = surface.winding(places[first])
         fall[first] = np.clip(1 - there / np.maximum(inside[loop[first]], LEAST_INSIDE), 0, 1)
         best = np.zeros(len(views))
         np.maximum.at(best, loop, sight * fall)
-        first = np.flatnonzero(left & (sight >= best[loop]))
+        first = np.flatnonzero(unasked & (sight >= best[loop]))
     return np.split(fall, np.cumsum(sizes[:-1]))
 
 

@@ -1,21 +1,21 @@
-"""Tell limbs from branches that hardly leave the parts they grow from, and cut these."""
+"""Spurs: which branches are limbs, and which hardly leave the part that they grow from?"""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
-from ...data.decisions import QUESTIONS, Decision
-from ..curve import Curve
+from ...data.decisions import logistic
 from ...geometry.groups import quantile
 from ...geometry.neighbourhoods import plane_axes
 from ...geometry.polylines import arc_lengths, place_at, relative_distance
-from ...geometry.vectors import TINY, cross, norm, unit
-from ..axis.sections import VertexPoints, measure_sections
-from .collapse import merge_into, with_fields
-from .evidence import Evidence, ask_once
-from .limbs import Limbs
+from ...geometry.vectors import TINY, Ints, cross, norm, unit
+from ..curve import Curve
+from ..limbs import JunctionLimbs
+from ..merging import merge_into
+from ..surface import Evidence, Memo, Surface
+from .question import Candidate, Question
 
 SPUR_POINTS = 128  # speed: of a branch that are enough to say how far it reaches
 SPUR_QUANTILE = 0.9  # fitted: share of a spur's points that its reach covers
@@ -27,90 +27,78 @@ OUTER_PLACES = np.linspace(1 / 3, 1, 5)  # measured: of the length; each but the
 ACROSS = 16  # precision: directions across a branch; eight are enough for flat parts
 
 
-def prune_spurs(curve: Curve, evidence: Evidence, least: float) -> tuple[Curve, list[Decision]]:
-    """Cut branches whose points hardly stand out of the surface around the limbs that meet there.
+class Limbs(Question):
+    """Which branches that leave a junction and end are limbs? Others, spurs, are cut.
 
     The points count, not the curve, since contraction shortens stubs as thick as they are long, and lets thin ones
     grow; and how far they leave the limbs that meet them, since along a part they may be anywhere. The limbs go on,
-    straight, to where they meet: contraction draws them together in a sharp corner, and a spur into its tip is left.
+    straight, to where they meet: contraction draws them together in a sharp corner, and a spur into its tip remains.
     Another branch with an end may be a spur, too: it counts as no thicker than the junction.
 
-    Of every junction the least probable limb goes first, until none is less probable than `least`; its points belong to
-    the junction and have no normals any more. There is one decision for each branch that leaves a junction and has an
-    end, cut or left; at its end.
+    Of every junction the least probable limb goes first; its points belong to the junction, and say nothing any more.
+    There is one decision for each branch, cut or not; at its end.
     """
-    decisions: list[Decision] = []
-    given, known = curve, dict[bytes, dict[str, float]]()
-    while True:
-        found = _twigs(curve, evidence, known)
-        worst: dict[int, _Twig] = {}
-        for twig in found:
-            before = worst.get(twig.junction)
-            if twig.probability < (before.probability if before else least):
-                worst[twig.junction] = twig
-        if not worst:
-            curve = curve.vertices, curve.radii
-            decisions += [limb_decision(*curve, twig.probability, [twig.tip], pruned=False) for twig in found]
-            return curve.changed(normals=given.normals), decisions
-        group = np.arange(len(curve.vertices))
-        for twig in worst.values():
-            group[twig.body] = twig.junction
-            path = [twig.junction, *twig.body.tolist()]
-            decisions.append(limb_decision(curve.vertices, curve.radii, twig.probability, path, pruned=True))
-        # points of a cut branch are farther from its junction than the surface there is: they have no say any more
-        gone = np.isin(curve.vertex_of_point, np.concatenate([twig.body for twig in worst.values()]))
-        normals = np.where(gone[:, None], np.nan, curve.normals)
-        curve = merge_into(curve.changed(normals=normals), group)
+
+    about, option, repeats = "limb", "limb", True
+    weights: ClassVar[Mapping[str, float]] = dict(  # fitted
+        constant=-3.0, protrusion=3.2, certainty=1.8, slenderness=1.0
+    )
+
+    def __init__(self) -> None:
+        self._known, self._mute = Memo[dict[str, float]](), np.zeros(0, bool)
+
+    def candidates(self, evidence: Evidence, least: float) -> list[Candidate]:
+        """One for each branch that leaves a junction and ends; its facts are known from before others were cut.
+
+        The facts are: how far its points (all but a tenth, and of a long limb those outside of its body) stand out of
+        the surface around the other limbs, over its own half width, as a logarithm, of which, if positive, the share is
+        left out that has the object beside it; how certain it is, minus the logarithm of what its mean confidence lacks
+        of 1; and how slender, minus the logarithm of its radius over the distance of the surface from the junction.
+        """
+        curve = self._with_mute_points(evidence.curve)
+        limbs, degree = JunctionLimbs(curve), curve.degree
+        paths = enumerate(branch[::-1] if degree[branch[0]] == 1 else branch for branch in limbs.branches)
+        asked = [(k, path) for k, path in paths if degree[path[0]] > 2 and degree[path[-1]] == 1]
+        keys = [limbs.signature(int(path[0])) + curve.vertices[path].tobytes() for _, path in asked]
+        facts = self._known.of(keys, asked, partial(_facts, curve, evidence.surface, limbs))
+        probabilities = [logistic(self.weights, each) for each in facts]
+        worst: dict[int, int] = {}
+        for i, (_, path) in enumerate(asked):
+            junction = int(path[0])
+            if probabilities[i] < (probabilities[worst[junction]] if junction in worst else least):
+                worst[junction] = i
+        spurs = [*worst.values()]
+        return [
+            limb_candidate(curve.vertices, curve.radii, asked[i][1], facts[i], probabilities[i], i in spurs)
+            for i in [*spurs, *(i for i in range(len(asked)) if i not in spurs)]
+        ]
+
+    def change(self, evidence: Evidence, chosen: Sequence[Candidate]) -> Curve:
+        """Merge spurs into the junctions that they leave: their points are farther from there than the surface is."""
+        curve, group = evidence.curve, np.arange(len(evidence.curve.vertices))
+        for path in (candidate.part for candidate in chosen):
+            group[path[1:]] = path[0]
+        self._mute = np.isin(curve.vertex_of_point, np.flatnonzero(group != np.arange(len(group)))) | self._muted(curve)
+        return merge_into(curve, group)
+
+    def _muted(self, curve: Curve) -> np.ndarray:
+        return self._mute if len(self._mute) else np.zeros(len(curve.points), bool)
+
+    def _with_mute_points(self, curve: Curve) -> Curve:
+        mute = self._muted(curve)
+        return curve.changed(normals=np.where(mute[:, None], np.nan, curve.normals)) if mute.any() else curve
 
 
-def limb_decision(
-    vertices: np.ndarray, radii: np.ndarray, probability: float, path: list[int], *, pruned: bool
-) -> Decision:
-    """The decision about a branch, a path of vertices from its junction to its tip; of a pruned one with its curve."""
-    places = tuple(tuple(place) for place in vertices[path].tolist())
-    curve = (places, tuple(radii[path].tolist())) if pruned else ()
-    return Decision("limb", places[-1], probability, pruned, *curve)
-
-
-def limb_facts(curve: Curve, evidence: Evidence) -> Iterator[tuple[int, dict[str, float]]]:
-    """What speaks for every branch that leaves a junction and has an end: its leaf, and facts.
-
-    The facts are: how far its points (all but a tenth, and of a long limb those outside of its body) stand out of the
-    surface around the other limbs, over its own half width, as a logarithm, of which, if positive, the share is left
-    out that has the object beside it; how certain it is, minus the logarithm of what its mean confidence lacks of 1;
-    and how slender, minus the logarithm of its radius over the distance of the surface from the junction.
-    """
-    return ((twig.tip, twig.facts) for twig in _twigs(curve, evidence, {}))
-
-
-class _Twig(NamedTuple):
-    """A branch that leaves a junction and has an end."""
-
-    junction: int
-    body: np.ndarray  # its other vertices
-    tip: int
-    facts: dict[str, float]
-
-    @property
-    def probability(self) -> float:
-        return QUESTIONS["limb"].probability(self.facts)
-
-
-def _twigs(curve: Curve, evidence: Evidence, known: dict[bytes, dict[str, float]]) -> list[_Twig]:
-    """Branches that leave a junction and have an end, with their facts, which are asked for where they are not known.
-
-    What is known is that of the same limbs, from before other branches were cut.
-    """
-    limbs, degree = Limbs(curve), curve.degree
-    paths = enumerate(branch[::-1] if degree[branch[0]] == 1 else branch for branch in limbs.branches)
-    found = [(k, path) for k, path in paths if degree[path[0]] > 2 and degree[path[-1]] == 1]
-    names = [limbs.signature(int(path[0])) + curve.vertices[path].tobytes() for _, path in found]
-    facts = ask_once(known, names, found, partial(_facts, curve, evidence, limbs))
-    return [_Twig(int(path[0]), path[1:], int(path[-1]), each) for (_, path), each in zip(found, facts, strict=True)]
+def limb_candidate(
+    vertices: np.ndarray, radii: np.ndarray, path: Ints, facts: Mapping[str, float], probability: float, pruned: bool
+) -> Candidate:
+    """A branch, a path of vertices from its junction to its tip; a pruned one with its curve."""
+    branch = ((vertices[path], radii[path]),) if pruned else ()
+    return Candidate(path, vertices[path[-1]], facts, probability, pruned, *branch)
 
 
 def _facts(
-    curve: Curve, evidence: Evidence, limbs: Limbs, found: list[tuple[int, np.ndarray]]
+    curve: Curve, surface: Surface, limbs: JunctionLimbs, asked: list[tuple[int, np.ndarray]]
 ) -> Iterator[dict[str, float]]:
     """What speaks for some branches, given by their numbers and as paths from their junctions."""
     degree, cloud, sections = curve.degree, curve.cloud, curve.sections
@@ -120,17 +108,17 @@ def _facts(
     for branch in limbs.branches:
         if 1 in degree[branch[[0, -1]]]:
             ending[branch] = degree[branch] < 3
-    surface = cloud.distance
-    outside = [_outside(curve.vertices, path, surface[path[0]], wide) for _, path in found]
+    distance = cloud.distance
+    outside = [_outside(curve.vertices, path, distance[path[0]], wide) for _, path in asked]
     half = np.array([np.average(wide[part], weights=count[part]) for part in outside])
-    beside = _beside(evidence, curve.vertices, sections.across, [path for _, path in found], half)
-    for (k, path), part, own_half, shared in zip(found, outside, half, beside, strict=True):
+    beside = _beside(surface, curve.vertices, sections.across, [path for _, path in asked], half)
+    for (k, path), part, own_half, shared in zip(asked, outside, half, beside, strict=True):
         junction, body = int(path[0]), path[1:]
         own = cloud.points[cloud.members.of(part)]
         # by how far they are, and not as they come, which depends on how the object is turned
         points = own[np.argsort(norm(own - curve.vertices[junction]))][:: len(own) // SPUR_POINTS + 1]
         out = max(_standing_out(limbs, k, junction, points, ending), 0.0) if own_half > 0 else 0.0
-        thickness = np.average(radius[part], weights=count[part]) / max(surface[junction], TINY)
+        thickness = np.average(radius[part], weights=count[part]) / max(distance[junction], TINY)
         ratio = np.clip(thickness, SLENDEREST, STOUTEST)
         protrusion = float(np.log(out / max(own_half, TINY) + LEAST_OUT))
         yield dict(
@@ -152,7 +140,7 @@ def _outside(vertices: np.ndarray, path: np.ndarray, surface: float, wide: np.nd
 
 
 def _beside(
-    evidence: Evidence, vertices: np.ndarray, width: np.ndarray, paths: list[np.ndarray], half: np.ndarray
+    surface: Surface, vertices: np.ndarray, width: np.ndarray, paths: list[np.ndarray], half: np.ndarray
 ) -> np.ndarray:
     """How much of the object is beside the outer half of each branch, (b,): of a limb 0, of a strand in a flat part 1.
 
@@ -160,13 +148,13 @@ def _beside(
     three places the mean counts. `paths` are branches, as numbers of `vertices` (m, 3), whose sections are widest in
     the directions `width` (m, 3); and `half` (b,) the half widths.
     """
-    found, near = [], []
+    along_branches, near = [], []
     for path in paths:
         along = arc_lengths(vertices[path])
         asked = along[-1] * OUTER_PLACES
-        found.append(place_at(vertices[path], along, asked))
+        along_branches.append(place_at(vertices[path], along, asked))
         near.append(path[np.searchsorted(along, asked[1:-1])])
-    places = np.array(found)
+    places = np.array(along_branches)
     # the first direction is the section's, so that the others turn with the object
     tangent = unit((places[:, 2:] - places[:, :-2]).reshape(-1, 3))
     second = cross(tangent, width[np.concatenate(near)])
@@ -176,12 +164,12 @@ def _beside(
     across = np.cos(turn) * cross(second, tangent) + np.sin(turn) * second
     away = NOT_BESIDE * half[:, None, None] * across.reshape(ACROSS, len(paths), -1, 3)
     beside = places[:, 1:-1] + away
-    winding = evidence.winding(beside.reshape(-1, 3)).reshape(beside.shape[:-1])
+    winding = surface.winding(beside.reshape(-1, 3)).reshape(beside.shape[:-1])
     inside: np.ndarray = np.clip(winding.max(axis=0), 0, 1).mean(axis=1)
     return inside
 
 
-def _standing_out(limbs: Limbs, k: int, junction: int, points: np.ndarray, ending: np.ndarray) -> float:
+def _standing_out(limbs: JunctionLimbs, k: int, junction: int, points: np.ndarray, ending: np.ndarray) -> float:
     """How far the points of branch k stand out of the surface around the other limbs."""
     if len(points) == 0:
         return 0.0

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...analysis.rigging import armature, bone_before, bone_names, skin_weights
 from ...analysis.segmentation import vertex_of_cloud
-from ...curve.thin.rooted import RootPlace
+from ...curve.rooted import RootPlace
 from ...data.skeleton import Skeleton
 from ...errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ...geometry.vectors import norm, unit

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from ...analysis.branches import branch_table
 from ...analysis.curves import simple_edges
-from ...curve.thin.rooted import RootPlace, numbered_from
+from ...curve.rooted import RootPlace, numbered_from
 from ...data.skeleton import Skeleton
 from ...editing import cut_loops, reroot
 from ...errors import FileFormatError

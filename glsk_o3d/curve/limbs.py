@@ -7,12 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..curve import Curve
-from ...geometry.groups import quantile
-from ...geometry.polylines import arc_lengths, place_at, relative_distance
-from ...geometry.vectors import TINY, dot, norm
-from ..axis.fit import FIT_STAY
-from ..axis.sections import VertexPoints
+from ..geometry.groups import quantile
+from ..geometry.polylines import arc_lengths, place_at, relative_distance
+from ..geometry.vectors import TINY, dot, norm
+from .axis.fit import FIT_STAY
+from .curve import Curve
 
 # All fitted.
 # distance from the other limbs, over that from them to the surface, where half a limb is undisturbed; and how large a
@@ -43,7 +42,7 @@ def _split(branch: np.ndarray, joint: np.ndarray) -> list[np.ndarray]:
     return [branch[a : b + 1] for a, b in pairwise(cuts)]
 
 
-class Limbs:
+class JunctionLimbs:
     """The branches of a curve seen from their junctions.
 
     The `surface` (M,) is as far from every vertex; without points, its radius. Of every branch there is the `radius`

@@ -1,58 +1,50 @@
-"""Merge vertices of a curve, and collapse the triangles of a graph, so that it is one-dimensional."""
+"""Merge vertices, drop vertices and edges, and collapse triangles, so that a graph is one-dimensional."""
 
 import heapq
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from ..curve import Curve
-from ...geometry.groups import group_sum
-from ...geometry.pairing import final_representatives
-from ..axis.sections import VertexPoints
+from ..data.graph import AnyGraph, all_of_vertices, in_order_of_ends
+from ..geometry.groups import group_sum
+from ..geometry.pairing import final_representatives
+from .axis.sections import VertexPoints
+from .curve import Curve
 
 
-def some_vertices(curve: Curve, which: np.ndarray) -> dict[str, Any]:
-    """The arrays of some vertices, by name, for `replace`: their places and all that is known of them."""
-    return {name: getattr(curve, name)[which] for name in ("vertices", *OF_VERTICES)}
-
-
-def merge_vertices(curve: Curve, group: np.ndarray) -> Curve:
+def merge_vertices(graph: AnyGraph, group: np.ndarray) -> AnyGraph:
     """Make one vertex of each group (M,), at the mean of its members weighted by the points they own.
 
     Groups have any labels. Points of merged vertices belong to the merged one. A vertex alone stays as it is, to the
     last bit, so that what is known of it holds.
     """
     label, group = np.unique(group, return_inverse=True)
-    n, weight = len(label), curve.cloud.mass
+    n, weight = len(label), VertexPoints(graph).mass
     total = group_sum(weight, group, n)
-    edges = np.sort(group[curve.edges], axis=1)
+    edges = np.sort(group[graph.edges], axis=1)
     alone = np.bincount(group)[group] == 1
 
-    def merged(values: np.ndarray) -> Any:
+    def mean(values: np.ndarray) -> Any:
         means = (group_sum((weight * values.T).T, group, n).T / total).T
         means[group[alone]] = values[alone]
         return means
 
-    known = some_vertices(curve, np.arange(len(group)))
-    return replace(
-        curve,
-        **{name: merged(values) for name, values in known.items()},
+    return graph.changed(
+        **{name: mean(values) for name, values in all_of_vertices(graph).items()},
         edges=np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0),
-        vertex_of_point=np.append(group, -1)[curve.vertex_of_point],
+        vertex_of_point=np.append(group, -1)[graph.vertex_of_point],
     )
 
 
-def merge_into(curve: Curve, into: np.ndarray) -> Curve:
+def merge_into(graph: AnyGraph, into: np.ndarray) -> AnyGraph:
     """Merge vertices `into` others (M,), which stay where and what they are, and in their order.
 
     Points of merged vertices belong to the one that stays.
     """
-    stay = np.unique(into)
-    return with_fields(merge_vertices(curve, into), **some_vertices(curve, stay))
+    return merge_vertices(graph, into).changed(**all_of_vertices(graph, np.unique(into)))
 
 
 def drop_edges(curve: Curve, gone: ArrayLike) -> Curve:
@@ -62,56 +54,27 @@ def drop_edges(curve: Curve, gone: ArrayLike) -> Curve:
 
 
 def drop_vertices(curve: Curve, lone: np.ndarray) -> Curve:
-    """Drop `lone` (M,) vertices, without edges, unless there are no others; their points go to the nearest left."""
-    left = np.flatnonzero(~lone)
-    if len(left) in (0, len(curve.vertices)):
+    """Drop `lone` (M,) vertices, without edges, unless there are no others; points go to the nearest other."""
+    remaining = np.flatnonzero(~lone)
+    if len(remaining) in (0, len(curve.vertices)):
         return curve
-    representative = cKDTree(curve.vertices[left]).query(curve.vertices)[1]
-    representative[left] = np.arange(len(left))
-    return replace(
-        curve,
-        **some_vertices(curve, left),
-        edges=representative[curve.edges],
+    representative = cKDTree(curve.vertices[remaining]).query(curve.vertices)[1]
+    representative[remaining] = np.arange(len(remaining))
+    return curve.changed(
+        **all_of_vertices(curve, remaining),
+        edges=in_order_of_ends(representative[curve.edges], len(remaining)),
         vertex_of_point=np.append(representative, -1)[curve.vertex_of_point],
     )
 
 
-def with_fields(curve: Curve, **fields: Any) -> Curve:
-    """The same graph with other fields than its edges, as by `replace`, but unchecked, and what is known of it kept."""
-    made, known = object.__new__(type(curve)), vars(curve)
-    names = (*ARRAYS, "report", "degree", "component_of_vertex", "branches")
-    vars(made).update({name: known[name] for name in names if name in known} | fields)
-    return made
-
-
-def with_gaps(curve: Curve, ends: np.ndarray) -> Curve:
-    """The same; its report has the ends, (g, 2, 3) float array, of more stretches that no point supports."""
-    joined = (*curve.report.joined, *((tuple(a), tuple(b)) for a, b in ends.tolist()))
-    return curve.changed(report=replace(curve.report, joined=joined))
-
-
-def binary_size(curve: Curve) -> float:
-    """The power of two next to the extent of a curve, so that scaling by it rounds nothing; 1 if it has none."""
-    extent = np.ptp(curve.vertices, axis=0).max(initial=0)
-    return float(2.0 ** np.round(np.log2(extent))) if extent > 0 else 1.0
-
-
-def scaled(curve: Curve, factor: float) -> Curve:
-    """The same in another unit of length."""
-    lengths = ("vertices", "points", "radii", "half_width", "half_thickness")
-    made = {name: factor * getattr(curve, name) for name in lengths}
-    blank = curve.changed(**made, report=replace(curve.report, joined=()))
-    return blank.with_gaps(factor * np.array(curve.report.joined))
-
-
-def collapse_triangles(curve: Curve, by_degree: bool = False) -> Curve:
+def collapse_triangles(curve: AnyGraph, by_degree: bool = False) -> AnyGraph:
     """Merge the two ends of edges that lie on a triangle, the shortest edge first, until there is no triangle.
 
     The published order, least mean degree of the two ends first and length to break ties, is a combinatorial one:
     another sample of the same surface has another, and finer vertices make it worse. Lengths converge with the
     vertices' spacing. Points of merged vertices belong to the vertex they were merged into.
     """
-    position, weight = curve.vertices.tolist(), curve.cloud.mass.tolist()
+    position, weight = curve.vertices.tolist(), VertexPoints(curve).mass.tolist()
     around: list[set[int]] = [set() for _ in position]
     for a, b in curve.edges.tolist():
         around[a].add(b)

@@ -1,18 +1,20 @@
-"""Cut the edges that cross air: between parts that noise or flying points join."""
+"""False branches: which cross empty space?"""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from heapq import heappop, heappush
+from typing import ClassVar
 
 import numpy as np
 
-from ...data.decisions import QUESTIONS, Decision
-from ..curve import Curve
+from ...data.decisions import logistic
 from ...geometry.groups import quantile
 from ...geometry.polylines import place_at
 from ...geometry.vectors import TINY
-from .collapse import drop_edges, drop_vertices
-from .evidence import Evidence
+from ..curve import Curve
+from ..merging import drop_edges, drop_vertices
+from ..surface import Evidence
 from .loops import crossings, positions
+from .question import Candidate, Question
 
 AIR_WINDOW = 1.0  # derived: radii of a branch along which evidence is averaged; a false edge is two radii long or more
 # fitted: radii over which it is seen where a curve goes: beyond an edge, but the first third, or to an end
@@ -21,25 +23,33 @@ CROSSING_HOPS = int(2 * HEADING_RADII)  # derived: edges as long, of half a radi
 LEAST_SCATTER = 0.05  # fitted: of winding numbers along a curve
 
 
-def cut_air(curve: Curve, evidence: Evidence, least: float) -> tuple[Curve, list[Decision]]:
-    """Cut every branch where it crosses air with a probability of `least` or more; one decision for each branch.
+class FalseBranches(Question):
+    """Which branches cross empty space, between parts that noise or flying points join? They are cut there.
 
-    The curve was fitted to its axis.
+    The curve was fitted to its axis. There is one decision for each branch.
     """
-    decisions, gone = [], []
-    for branch, place, facts in branch_facts(curve, evidence):
-        weakest, chance = branch[place : place + 2], QUESTIONS["air"].probability(facts)
-        middle = curve.vertices[weakest].mean(axis=0)
-        decisions.append(Decision("air", tuple(middle.tolist()), chance, chance >= least))
-        if chance >= least:
-            gone.append(sorted(weakest.tolist()))
-    if not gone:
-        return curve, decisions
-    cut = drop_edges(curve, gone)
-    return drop_vertices(cut, cut.degree == 0), decisions
+
+    about, option, repeats = "air", "air", False
+    weights: ClassVar[Mapping[str, float]] = dict(  # fitted
+        constant=-5.8, deficit=1.7, surface=-0.5, straightness=-3.2, noise=1.9, bonds=-0.9, inner=3.4, length=-0.5
+    )
+
+    def candidates(self, evidence: Evidence, least: float) -> list[Candidate]:
+        """One for the weakest edge of each branch, see `branch_facts`."""
+        answers = []
+        for branch, k, facts in branch_facts(evidence):
+            weakest, probability = branch[k : k + 2], logistic(self.weights, facts)
+            place = evidence.curve.vertices[weakest].mean(axis=0)
+            answers.append(Candidate(np.sort(weakest), place, facts, probability, probability >= least))
+        return answers
+
+    def change(self, evidence: Evidence, chosen: Sequence[Candidate]) -> Curve:
+        """Drop the weakest edges, and vertices that are alone then."""
+        cut = drop_edges(evidence.curve, [candidate.part for candidate in chosen])
+        return drop_vertices(cut, cut.degree == 0)
 
 
-def branch_facts(curve: Curve, evidence: Evidence) -> Iterator[tuple[np.ndarray, int, dict[str, float]]]:
+def branch_facts(evidence: Evidence) -> Iterator[tuple[np.ndarray, int, dict[str, float]]]:
     """What the evidence says about the weakest place of every branch.
 
     The weakest place is where the winding number, averaged over a window of one radius, is least. The facts, of which
@@ -56,16 +66,14 @@ def branch_facts(curve: Curve, evidence: Evidence) -> Iterator[tuple[np.ndarray,
     With them comes the branch, (p,) int array, of which a ring begins where its winding number is greatest, and the
     position in it of the first end of the weakest edge.
     """
+    curve, winding = evidence.curve, evidence.winding
     vertices, edges, m = curve.vertices, curve.edges, len(curve.vertices)
     length = np.maximum(curve.edge_lengths, TINY)
-    winding = evidence.winding_along(curve)
     typical = quantile(winding)
     scatter = 1.4826 * quantile(np.abs(winding - typical)) + LEAST_SCATTER * abs(typical)
-    along = evidence.surface_around(curve)
     tubes = 2 * np.pi * np.maximum(curve.radii[edges].mean(axis=1), TINY) @ length
-    area = along.sum()
+    area = evidence.area.sum()
     seen = max(area / max(tubes, area * TINY, TINY), TINY)  # a line has no tubes
-    bonds = evidence.bonds(curve)
     keys = edges @ [m, 1]
     around: list[list[tuple[int, float]]] = [[] for _ in vertices]
     for (a, b), step in zip(edges.tolist(), curve.edge_lengths.tolist(), strict=True):
@@ -78,14 +86,15 @@ def branch_facts(curve: Curve, evidence: Evidence) -> Iterator[tuple[np.ndarray,
     for branch in curve.branches:
         if branch[0] == branch[-1]:
             ring = np.roll(branch[:-1], -int(np.argmax(winding[numbers(branch)])))
-            branch, bonded = np.append(ring, ring[0]), crossings(positions(ring, m), len(ring), bonds, closed=True)
+            branch = np.append(ring, ring[0])
+            bonded = crossings(positions(ring, m), len(ring), evidence.bonds, closed=True)
         else:
-            bonded = crossings(_sides(branch, around, m), len(branch), bonds, closed=False)[:-1]
+            bonded = crossings(_sides(branch, around, m), len(branch), evidence.bonds, closed=False)[:-1]
         edge = numbers(branch)
         # of a line, which has no thickness, what rounding leaves
         radius = max(quantile(curve.radii[branch]), float(np.finfo(float).eps * length.sum()), TINY)
         ends = np.append(0, np.cumsum(length[edge]))
-        amounts = winding[edge] * length[edge], along[edge]
+        amounts = winding[edge] * length[edge], evidence.area[edge]
         smooth, areas = _window_means(ends, ends[1:] - length[edge] / 2, AIR_WINDOW * radius, *amounts)
         k = int(np.argmin(smooth))
         surface = areas[k] / (2 * np.pi * radius)
@@ -94,7 +103,7 @@ def branch_facts(curve: Curve, evidence: Evidence) -> Iterator[tuple[np.ndarray,
             surface=np.log(max(surface / seen, 0) + 0.05),
             straightness=_straightness(vertices, around, branch, k, radius),
             noise=curve.report.noise,
-            bonds=np.log(float(bonded.min()) / 2 * evidence.spacing / (2 * np.pi * radius) + 0.05),
+            bonds=np.log(float(bonded.min()) / 2 * evidence.surface.spacing / (2 * np.pi * radius) + 0.05),
             inner=float((curve.degree[branch[[0, -1]]] > 1).all()),
             length=np.log(ends[-1] / radius + 0.1),
         )
