@@ -18,7 +18,7 @@ from .pipeline import Filter, OnIteration, OnState, Pipeline
 from .recipes import RECIPE_ENDING, load_recipe
 from .recipes.catalogue import named_pipeline
 
-PipelineChoice: TypeAlias = Pipeline[Skeleton] | str | os.PathLike[str] | Mapping[str, Any]
+PipelineChoice: TypeAlias = Pipeline[Any, Skeleton] | str | os.PathLike[str] | Mapping[str, Any]
 """A pipeline, its name, the path of a recipe, or options for the default."""
 
 
@@ -72,14 +72,16 @@ def skeletonize(
     return chosen_pipeline(pipeline, options)(cloud, on_iteration=on_iteration, on_state=on_state)
 
 
-def chosen_pipeline(pipeline: PipelineChoice, options: Mapping[str, Any]) -> Pipeline[Skeleton]:
+def chosen_pipeline(pipeline: PipelineChoice, options: Mapping[str, Any]) -> Pipeline[Any, Skeleton]:
     """The pipeline that is meant, with options: what `skeletonize` takes."""
     if isinstance(pipeline, Mapping):
         return as_pipeline("default").with_options(pipeline, **options)
     return as_pipeline(pipeline).with_options(options)
 
 
-def as_pipeline(pipeline: Pipeline[Skeleton] | Filter[Skeleton] | str | os.PathLike[str]) -> Pipeline[Skeleton]:
+def as_pipeline(
+    pipeline: Pipeline[Any, Skeleton] | Filter[Any, Skeleton] | str | os.PathLike[str],
+) -> Pipeline[Any, Skeleton]:
     """The pipeline from a cloud to a skeleton that is meant by a pipeline, a filter, a name, or the path of a recipe.
 
     InvalidParameterError and RecipeError as of `skeletonize`.

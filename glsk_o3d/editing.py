@@ -9,8 +9,8 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 from .analysis.branches import branch_table
 from .curve.detail import with_limbs
 from .curve.merging import merge_into
-from .data.graph import all_of_vertices
 from .curve.rooted import RootPlace, numbered_from, root_among
+from .data.graph import all_of_vertices
 from .data.skeleton import Skeleton, of_input
 from .errors import InvalidParameterError
 from .geometry.near_links import linked

@@ -1,4 +1,4 @@
-"""Filters, and pipelines of filters joined with `|`."""
+"""Filters, pipelines of filters joined with `|`, and what a run of one shares with its filters."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import dataclasses
 import logging
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from copy import copy, deepcopy
+from copy import deepcopy
 from itertools import pairwise
-from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
+from typing import Any, ClassVar, Generic, TypeAlias, TypeVar, get_args, get_origin
 
 from .data.contraction import Contraction
 from .data.points import Points
@@ -20,8 +20,9 @@ from .parameters import UNWRITTEN, Parameters, is_own
 
 OnIteration: TypeAlias = Callable[[IterationRecord], bool | None]
 OnState: TypeAlias = Callable[[Contraction], object]
-Watch: TypeAlias = Callable[[Contraction], bool | None]
-Produced = TypeVar("Produced", covariant=True)
+AnyFilter: TypeAlias = "Filter[Any, Any]"
+In = TypeVar("In", contravariant=True)
+Out = TypeVar("Out", covariant=True)
 Next = TypeVar("Next")
 
 FLOWS = (Cloud, Points, Contraction, Skeleton)
@@ -39,10 +40,50 @@ SOLVED = (
 _log = logging.getLogger(__name__)
 
 
-class Filter(Parameters, Generic[Produced]):
+@dataclasses.dataclass
+class RunContext:
+    """What a run shares with its filters: the record of those that ran, progress, and cancelling."""
+
+    report: Report = dataclasses.field(default_factory=Report)
+    """Says of filters that they ran, and nothing else."""
+    on_iteration: OnIteration | None = None
+    on_state: OnState | None = None
+
+    def after_solve(self, state: Contraction) -> bool:
+        """Tell the listeners of the state after an iteration; False to stop there.
+
+        The ``report.iterations`` of the state end with the record of that iteration.
+        """
+        record = state.report.iterations[-1]
+        _log.debug(SOLVED, dataclasses.asdict(record))
+        if self.on_state is not None:
+            self.on_state(deepcopy(state))  # what is done to it does not change the run
+        answer = None if self.on_iteration is None else self.on_iteration(record)
+        return answer is None or answer not in (False,)  # NumPy's False and 0 are equal to it
+
+    def note(self, stage: AnyFilter, seconds: float, stopped: str | None = None) -> None:
+        """Add a filter that ran to the record."""
+        name, table, report = type(stage).__name__, stage.table(), self.report
+        if stopped:
+            table[UNWRITTEN] = stopped
+        self.report = dataclasses.replace(
+            report,
+            stages=(*report.stages, repr(stage)),
+            recipe=recipe_of(*report.recipe.get("pipeline", ()), table),
+            seconds=report.seconds | {name: report.seconds.get(name, 0.0) + seconds},
+        )
+
+    def report_of(self, report: Report) -> Report:
+        """A report of what was found, with the filters that ran."""
+        ran = self.report
+        return dataclasses.replace(report, stages=ran.stages, recipe=ran.recipe, seconds=ran.seconds)
+
+
+class Filter(Parameters, Generic[In, Out]):
     """A stage of a pipeline: a frozen, keyword-only dataclass that maps what it `consumes` to something new.
 
-    Filters keep no state between calls and never change their input. They are joined with ``|``.
+    ``class Mine(Filter[Skeleton, Skeleton])`` says what it takes and gives. Filters keep no state between calls and
+    never change their input. They are joined with ``|``.
 
     Examples
     --------
@@ -57,9 +98,15 @@ class Filter(Parameters, Generic[Produced]):
     produces: ClassVar[type] = Contraction
     """What it gives. A cloud, which only a filter of clouds gives, carries no report: pipelines tell of its stage."""
 
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        for base in cls.__dict__.get("__orig_bases__", ()):
+            if get_origin(base) is Filter:
+                cls.consumes, cls.produces = get_args(base)
+
     def __call__(
-        self, data: Any, *, on_iteration: OnIteration | None = None, on_state: OnState | None = None
-    ) -> Produced:
+        self, data: object, *, on_iteration: OnIteration | None = None, on_state: OnState | None = None
+    ) -> Out:
         """Run the filter, as a pipeline of it alone.
 
         Parameters
@@ -81,49 +128,22 @@ class Filter(Parameters, Generic[Produced]):
         StageError
             `data` is not what the filter takes, or what it gives is not what it promises.
         """
-        return Pipeline(self)(data, on_iteration=on_iteration, on_state=on_state)
+        return Pipeline[In, Out](self)(data, on_iteration=on_iteration, on_state=on_state)
 
     @classmethod
     def takes_clouds(cls) -> bool:
         """Whether the filter takes a cloud; one of `Points` takes all its points, as by ``Sampler(size="all")``."""
         return cls.consumes in (Cloud, Points)
 
-    def __or__(self, other: Filter[Next] | Pipeline[Next]) -> Pipeline[Next]:
-        return Pipeline(self) | other
+    def __or__(self, other: Filter[Out, Next] | Pipeline[Out, Next]) -> Pipeline[In, Next]:
+        return Pipeline[In, Out](self) | other
 
-    def _run(self, data: Any, watch: Watch | None) -> Any:
-        """The work itself; `watch` is None or wants the Contraction after each solve, and says False to stop."""
+    def run(self, data: In, context: RunContext) -> Out:
+        """The work itself; one that iterates asks ``context.after_solve`` after each iteration whether to go on."""
         raise NotImplementedError
 
-    def run(self, data: Any, watch: Watch | None) -> Any:
-        """What `_run` gives, if it takes the data and gives what the filter promises.
 
-        Where a filter that is not of this package fails, the error says whose it is.
-        """
-        name = type(self).__name__
-        if not (_is_of(data, self.consumes) or (_is_of(data, Cloud) and self.takes_clouds())):
-            raise StageError(f"{name} takes a {_named(self.consumes)}, not a {type(data).__name__}: {ORDER}")
-        if self.consumes is Points and not isinstance(data, Points):
-            data = Points.of(data)
-        try:
-            result = self._run(data, watch)
-        except (GlskError, MemoryError, Warning):
-            raise
-        except Exception as error:
-            if is_own(type(self)):
-                raise
-            raise StageError(f"{name} of {self.__module__} failed: {type(error).__name__}: {error}") from error
-        if result is None or not _is_of(result, self.produces):
-            raise StageError(f"{name} should give a {_named(self.produces)} and gave a {type(result).__name__}")
-        if self.produces is Cloud:
-            try:
-                cloud_points(result)
-            except InvalidCloudError as error:
-                raise InvalidCloudError(f"{name} gave no usable cloud: {error}") from error
-        return result
-
-
-class Pipeline(Generic[Produced]):
+class Pipeline(Generic[In, Out]):
     """A sequence of filters. Called on a cloud, it passes the result of each filter to the next.
 
     Parameters
@@ -138,7 +158,7 @@ class Pipeline(Generic[Produced]):
     RingBuilder(k=12, ...) | Contractor(...) | Connector(radius='3%', ...)
     """
 
-    def __init__(self, *stages: Filter[Any]) -> None:
+    def __init__(self, *stages: AnyFilter) -> None:
         if not stages:
             raise InvalidParameterError("a pipeline needs at least one filter")
         for stage in stages:
@@ -154,12 +174,12 @@ class Pipeline(Generic[Produced]):
 
     def __call__(
         self,
-        cloud: Any,
+        cloud: object,
         *,
         on_iteration: OnIteration | None = None,
         on_state: OnState | None = None,
-        on_stage: Callable[[Filter[Any]], object] | None = None,
-    ) -> Produced:
+        on_stage: Callable[[AnyFilter], object] | None = None,
+    ) -> Out:
         """Run all filters on a cloud.
 
         Parameters
@@ -177,33 +197,34 @@ class Pipeline(Generic[Produced]):
         Skeleton, Contraction or cloud
             Whatever the last filter gives.
         """
-        data = cloud.whole if isinstance(cloud, Skeleton) else cloud
-        report = cloud.report if isinstance(cloud, FLOWS[1:]) else Report()
-        told = report.warnings
-        watch = _watch(on_iteration, on_state)
+        data: Any = cloud.whole if isinstance(cloud, Skeleton) else cloud
+        report: Report = data.report if isinstance(data, FLOWS[1:]) else Report()
+        context, known = RunContext(report, on_iteration, on_state), report.warnings
         for stage in self.stages:
             if on_stage is not None:
                 on_stage(stage)
             start = time.perf_counter()
-            data = stage.run(data, watch)
+            data = _result(stage, data, context)
             seconds = time.perf_counter() - start
             _log.debug("%s took %.3f s: %r", type(stage).__name__, seconds, data)
-            if stage.produces is Cloud:
-                report = with_stage(report, stage, seconds)
-            else:
-                report = with_stage(with_filters(data.report, report), stage, seconds)
-                data = copy(data)  # as it is: to check it once more would take longer
-                object.__setattr__(data, "report", report)
-        warn(message for message in report.warnings if message not in told)
-        produced: Any = of_input(data) if isinstance(data, Skeleton) else data
-        return produced
+            stopped = None
+            if stage.produces is not Cloud:
+                report = data.report
+                if report.stop_reason == STOPPED_BY_CALLER:
+                    stopped = f"the contraction was stopped by the caller after solve {len(report.iterations)}"
+            context.note(stage, seconds, stopped)
+        warn(message for message in report.warnings if message not in known)
+        if isinstance(data, FLOWS[1:]):
+            data = data.with_report(context.report_of(report))
+        result: Any = of_input(data) if isinstance(data, Skeleton) else data
+        return result  # type: ignore[no-any-return]
 
     def check_complete(self) -> None:
         """Raise InvalidParameterError unless the pipeline leads from a cloud to a skeleton."""
         if not self.stages[0].takes_clouds() or self.stages[-1].produces is not Skeleton:
             raise InvalidParameterError(f"{self!r} does not lead from a cloud to a skeleton")
 
-    def with_options(self, options: Mapping[str, Any] | None = None, /, **named: Any) -> Pipeline[Produced]:
+    def with_options(self, options: Mapping[str, Any] | None = None, /, **named: Any) -> Pipeline[In, Out]:
         """This pipeline with other values of some parameters.
 
         Parameters
@@ -232,7 +253,7 @@ class Pipeline(Generic[Produced]):
         >>> thin.stages[4].k, thin.stages[5].reducer, thin.stages[6].radius
         (12, None, '2%')
         """
-        pipeline: Pipeline[Produced] = self
+        pipeline: Pipeline[In, Out] = self
         names: dict[tuple[type[Parameters], str], str] = {}
         given = [*(options or {}).items(), *named.items()]
         # a reducer or a rule is put in, or taken out, before its parameters change
@@ -266,7 +287,7 @@ class Pipeline(Generic[Produced]):
             raise InvalidParameterError(f"{name}: more than one part of the pipeline has it: write {choice}")
         return meant[0]
 
-    def __or__(self, other: Filter[Next] | Pipeline[Next]) -> Pipeline[Next]:
+    def __or__(self, other: Filter[Out, Next] | Pipeline[Out, Next]) -> Pipeline[In, Next]:
         return Pipeline(*self.stages, *(other.stages if isinstance(other, Pipeline) else (other,)))
 
     def __repr__(self) -> str:
@@ -279,7 +300,7 @@ class Pipeline(Generic[Produced]):
         return hash(self.stages)
 
 
-def parts(item: Pipeline[Any] | Parameters) -> Iterator[Parameters]:
+def parts(item: Pipeline[Any, Any] | Parameters) -> Iterator[Parameters]:
     """Everything with parameters in a pipeline: its filters, and after each the reducer and the rule inside."""
     if isinstance(item, Pipeline):
         inner: Iterable[Any] = item.stages
@@ -305,22 +326,32 @@ def recipe_of(*tables: dict[str, Any]) -> dict[str, Any]:
     return {"glsk_o3d": {"version": RECIPE_VERSION}, "pipeline": list(tables)}
 
 
-def with_filters(report: Report, other: Report) -> Report:
-    """A report that says of another's filters that they ran, instead of its own."""
-    return dataclasses.replace(report, stages=other.stages, recipe=other.recipe, seconds=other.seconds)
+def _result(stage: AnyFilter, data: Any, context: RunContext) -> Any:
+    """What a filter gives, if it takes the data and gives what it promises.
 
-
-def with_stage(report: Report, stage: Filter[Any], seconds: float) -> Report:
-    """A report with one more filter in it."""
-    name, table = type(stage).__name__, stage.table()
-    if report.stop_reason == STOPPED_BY_CALLER:
-        table[UNWRITTEN] = f"the contraction was stopped by the caller after solve {len(report.iterations)}"
-    return dataclasses.replace(
-        report,
-        stages=(*report.stages, repr(stage)),
-        recipe=recipe_of(*report.recipe.get("pipeline", ()), table),
-        seconds=report.seconds | {name: report.seconds.get(name, 0.0) + seconds},
-    )
+    Where a filter that is not of this package fails, the error says whose it is.
+    """
+    name = type(stage).__name__
+    if not (_is_of(data, stage.consumes) or (_is_of(data, Cloud) and stage.takes_clouds())):
+        raise StageError(f"{name} takes a {_named(stage.consumes)}, not a {type(data).__name__}: {ORDER}")
+    if stage.consumes is Points and not isinstance(data, Points):
+        data = Points.of(data)
+    try:
+        result = stage.run(data, context)
+    except (GlskError, MemoryError, Warning):
+        raise
+    except Exception as error:
+        if is_own(type(stage)):
+            raise
+        raise StageError(f"{name} of {stage.__module__} failed: {type(error).__name__}: {error}") from error
+    if result is None or not _is_of(result, stage.produces):
+        raise StageError(f"{name} should give a {_named(stage.produces)} and gave a {type(result).__name__}")
+    if stage.produces is Cloud:
+        try:
+            cloud_points(result)
+        except InvalidCloudError as error:
+            raise InvalidCloudError(f"{name} gave no usable cloud: {error}") from error
+    return result
 
 
 def _is_of(data: Any, flow: type) -> bool:
@@ -330,19 +361,3 @@ def _is_of(data: Any, flow: type) -> bool:
 
 def _named(flow: type) -> str:
     return "cloud" if flow is Cloud else flow.__name__
-
-
-def _watch(on_iteration: OnIteration | None, on_state: OnState | None) -> Watch | None:
-    """One callback for both, and for the log; None where nobody listens."""
-    if on_iteration is None and on_state is None and not _log.isEnabledFor(logging.DEBUG):
-        return None
-
-    def watch(state: Contraction) -> bool | None:
-        record = state.report.iterations[-1]
-        _log.debug(SOLVED, vars(record))
-        if on_state is not None:
-            on_state(deepcopy(state))  # what is done to it does not change the run
-        answer = None if on_iteration is None else on_iteration(record)
-        return None if answer is None else answer not in (False,)  # NumPy's False and 0 are equal to it
-
-    return watch

@@ -18,11 +18,12 @@ from .filters.sampler import Sampler
 from .filters.stopping import ExplainedScore, RingSizeRatio
 from .filters.thinner import Thinner
 from .filters.tracer import Tracer
+from .interop.clouds import Cloud
 from .parameters import Parameters
 from .pipeline import Pipeline
 
 
-def cao2010() -> Pipeline[Skeleton]:
+def cao2010() -> Pipeline[Cloud, Skeleton]:
     """The baseline: contraction without reduction, stopped by the ring sizes (Cao et al. 2010).
 
     Examples
@@ -33,7 +34,7 @@ def cao2010() -> Pipeline[Skeleton]:
     return _published(stop=RingSizeRatio(), max_iterations=20)
 
 
-def wen2024() -> Pipeline[Skeleton]:
+def wen2024() -> Pipeline[Cloud, Skeleton]:
     """GLSkeleton as published (Wen et al. 2024), with the choices of the authors' code where it differs from the paper.
 
     Merges visit the points in the order of the input and drop the mass of merged points. The stopping rule waits for
@@ -48,7 +49,7 @@ def wen2024() -> Pipeline[Skeleton]:
     return _published(reducer=reducer, stop=ExplainedScore(threshold=0.02))
 
 
-def _published(**contraction: Any) -> Pipeline[Skeleton]:
+def _published(**contraction: Any) -> Pipeline[Cloud, Skeleton]:
     """What both published pipelines have in common: none of what this package adds."""
     return (
         Sampler(size="all", frame="box")
@@ -59,7 +60,7 @@ def _published(**contraction: Any) -> Pipeline[Skeleton]:
     )
 
 
-def default() -> Pipeline[Skeleton]:
+def default() -> Pipeline[Cloud, Skeleton]:
     """The recommended pipeline: GLSkeleton with conserved mass, a fit to the axis and a test of the topology.
 
     Examples
@@ -71,7 +72,7 @@ def default() -> Pipeline[Skeleton]:
     return _graph() | Refiner() | Tracer()
 
 
-def tree(root: str | Any = "z") -> Pipeline[Skeleton]:
+def tree(root: str | Any = "z") -> Pipeline[Cloud, Skeleton]:
     """One rooted tree, for trees and plants: the result of `default` with gaps joined and loops closed.
 
     It assumes that all points are of one plant. Remove ground, pot and neighbours first.
@@ -91,12 +92,12 @@ def tree(root: str | Any = "z") -> Pipeline[Skeleton]:
     return _graph() | Refiner(handle=1) | Tracer(root=root)
 
 
-def _graph() -> Pipeline[Skeleton]:
+def _graph() -> Pipeline[Cloud, Skeleton]:
     """The raw graph of `default`. Its merges wait for large clouds: which pairs they take hangs on the least change."""
     return rings() | Contractor(reducer=LPRReducer(least=2 * ENOUGH_POINTS)) | Connector()
 
 
-def rings() -> Pipeline[Contraction]:
+def rings() -> Pipeline[Cloud, Contraction]:
     """From a cloud to its rings, with outliers, noise and surplus points removed: the start of `default`.
 
     Examples
@@ -109,7 +110,7 @@ def rings() -> Pipeline[Contraction]:
     return Sampler() | OutlierRemover() | Denoiser() | Thinner() | RingBuilder()
 
 
-PIPELINES: dict[str, Callable[[], Pipeline[Skeleton]]] = {
+PIPELINES: dict[str, Callable[[], Pipeline[Cloud, Skeleton]]] = {
     make.__name__: make for make in (default, tree, wen2024, cao2010)
 }
 

@@ -24,7 +24,7 @@ skeleton = glsk.skeletonize(cloud, k="auto", reducer=None, root=(0, 0, 1), links
 skeleton = glsk.skeletonize(cloud, "pipeline of a plugin", option_of_its=3)
 start: Pipeline[Contraction] = RingBuilder(k="auto") | Contractor(reducer=LPRReducer(), stop=ExplainedScore(0.02))
 state: Contraction = start(cloud)
-whole: Pipeline[Skeleton] = start | Connector(radius="2%", links="all") | Refiner()
+whole: Pipeline[Any, Skeleton] = start | Connector(radius="2%", links="all") | Refiner()
 skeleton = whole(cloud, on_stage=lambda stage: print(stage.kind))
 skeleton = pipelines.default().with_options(k=24)(cloud)
 RingBuilder(k=24, radius=0.1)

@@ -26,7 +26,7 @@ import glsk_o3d as glsk
 from glsk_o3d import pipelines, samples
 from glsk_o3d.analysis import Gripper, grasp_candidates, segment
 from glsk_o3d.analysis.segmentation import branch_of_edge
-from glsk_o3d.curve.topology.collapse import collapse_triangles
+from glsk_o3d.curve.merging import collapse_triangles
 from glsk_o3d.geometry.cycles import inscribed_circle, minimum_cycle_basis
 from glsk_o3d.geometry.neighbourhoods import plane_axes
 from glsk_o3d.io.colors import shades

@@ -100,7 +100,7 @@ def support(
 
 def with_support(
     skeleton: Skeleton,
-    pipeline: Pipeline[Skeleton],
+    pipeline: Pipeline[Any, Skeleton],
     draws: int,
     *,
     seed: int = 0,

@@ -15,13 +15,13 @@ _BOOLS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no"
 
 def choose(
     pipeline: str, settings: Iterable[str] | None = (), drop_invalid: bool = False, sample: int | None = None
-) -> Pipeline[Any]:
+) -> Pipeline[Any, Any]:
     """The pipeline, from a cloud to a skeleton, that the options of a command ask for."""
     flags = ["drop_invalid=true"] * drop_invalid + [f"Sampler.sample={sample}"] * (sample is not None)
     return override(as_pipeline(pipeline), [*(settings or ()), *flags])
 
 
-def override(pipeline: Pipeline[Any], settings: Iterable[str]) -> Pipeline[Any]:
+def override(pipeline: Pipeline[Any, Any], settings: Iterable[str]) -> Pipeline[Any, Any]:
     """A pipeline with parameters replaced, each wherever its filter occurs, also inside another filter; in their order.
 
     A setting is ``Filter.parameter=value``, or ``parameter=value`` where only one part of the pipeline has a parameter
@@ -34,7 +34,7 @@ def override(pipeline: Pipeline[Any], settings: Iterable[str]) -> Pipeline[Any]:
     return pipeline
 
 
-def _parse(setting: str, pipeline: Pipeline[Any]) -> tuple[str, Any]:
+def _parse(setting: str, pipeline: Pipeline[Any, Any]) -> tuple[str, Any]:
     """A setting as `Pipeline.with_options` takes it: ``"Filter.parameter"`` and the value."""
     key, _, text = (word.strip() for word in setting.partition("="))
     owner, dot, name = (word.strip() for word in key.rpartition("."))

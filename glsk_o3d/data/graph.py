@@ -101,7 +101,7 @@ class Graph(Changeable):
         return tuple(np.array(vertices) for vertices, _ in maximal_paths(len(self.vertices), self.edges))
 
 
-def all_of_vertices(graph: Graph, rows: Any = slice(None)) -> dict[str, np.ndarray]:
+def all_of_vertices(graph: Graph, rows: Any = slice(None)) -> dict[str, Any]:
     """The place of some vertices and all that is known of them, by field, for `Graph.changed`."""
     return {name: getattr(graph, name)[rows] for name in ("vertices", *OF_VERTICES)}
 

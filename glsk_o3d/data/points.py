@@ -100,6 +100,10 @@ class Representatives:
             return self.sampled
         return (self.representative_of_point >= 0) & ~self.outlier
 
+    def with_report(self: Some, report: Report) -> Some:
+        """The same with another record of the run."""
+        return replace(self, report=report)
+
     def merged_into(self: Some, representative: np.ndarray, **changes: Any) -> Some:
         """The same with survivors merged into others, each into the `representative` (n,) of it; a survivor is its own.
 

@@ -1,7 +1,7 @@
 """Connector: contracted cloud -> graph (Cao et al. 2010, section 5)."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from ..geometry.neighbourhoods import nearest_neighbours, row_medians
 from ..geometry.radii import plane_distance_radii
 from ..geometry.vectors import norm
 from ..parameters import documented, parameter, resolve_length
-from ..pipeline import Filter, Watch
+from ..pipeline import Filter, RunContext
 
 LEAST_RADIUS = 1.0  # fitted: of a ball around a vertex, in percent of the diagonal
 RING_WIDTH = 2  # fitted: mean edges of a ring across it: nearer vertices would share the points around them
@@ -21,7 +21,7 @@ RING_WIDTH = 2  # fitted: mean edges of a ring across it: nearer vertices would 
 
 @documented
 @dataclass(frozen=True, kw_only=True)
-class Connector(Filter[Skeleton]):
+class Connector(Filter[Contraction, Skeleton]):
     """Sample the contracted points and join samples whose points are ring neighbours.
 
     Farthest-point sampling leaves a ball around every vertex, as wide as `radius` or a share of the local thickness.
@@ -47,9 +47,6 @@ class Connector(Filter[Skeleton]):
     (1, True)
     """
 
-    consumes: ClassVar[type] = Contraction
-    produces: ClassVar[type] = Skeleton
-
     radius: float | str = parameter(
         "auto",
         "Least distance between vertices: smaller details are lost, and parts closer than this fuse. 'auto' is 1 % of "
@@ -69,7 +66,7 @@ class Connector(Filter[Skeleton]):
         choices=("all", "nearest"),
     )
 
-    def _run(self, state: Contraction, watch: Watch | None) -> Skeleton:
+    def run(self, state: Contraction, context: RunContext) -> Skeleton:
         auto, diagonal = self.radius == "auto", state.frame.diagonal * state.frame.scale
         radius: Any = resolve_length(f"{LEAST_RADIUS}%" if auto else self.radius, diagonal) / state.frame.scale
         if auto:

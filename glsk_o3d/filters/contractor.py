@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -17,7 +17,7 @@ from ..geometry.rings import Rings
 from ..geometry.solver import Elimination, SolveError, solve_contraction
 from ..geometry.vectors import TINY
 from ..parameters import documented, parameter
-from ..pipeline import Filter, Watch, with_filters
+from ..pipeline import Filter, RunContext
 from .stopping import ExplainedScore, StopRule
 
 LINE_VARIANCE = 0.99  # fitted: explained variance that counts as a line
@@ -34,7 +34,7 @@ def ring_laplacian(state: Contraction) -> csr_matrix:
 
 @documented
 @dataclass(frozen=True, kw_only=True)
-class Contractor(Filter[Contraction]):
+class Contractor(Filter[Contraction, Contraction]):
     r"""Contract a cloud onto its curve skeleton, with an optional reduction after each solve.
 
     Each iteration solves :math:`(w_L^2 L^T M^{-1} L + M W_H^2) P' = M W_H^2 P` with the cotangent Laplacian L of the
@@ -60,8 +60,6 @@ class Contractor(Filter[Contraction]):
     'reached max_iterations = 2'
     """
 
-    consumes: ClassVar[type] = Contraction
-
     reducer: Reducer | None = parameter(
         None, "Merges redundant points after solves; None keeps them all.", type="reducer?"
     )
@@ -79,11 +77,15 @@ class Contractor(Filter[Contraction]):
     retries: int = parameter(3, "Times a solve that throws points out of the box is repeated with these held.", low=0)
     max_attraction: float = parameter(1e4, "Cap of W_H.", low=0, open_low=True)
 
-    def _run(self, state: Contraction, watch: Watch | None) -> Contraction:
-        return self.contract(state, watch=watch)
+    def run(self, state: Contraction, context: RunContext) -> Contraction:
+        return self.contract(state, watch=context.after_solve)
 
     def contract(
-        self, state: Contraction, laplacian: Laplacian = ring_laplacian, *, watch: Watch | None = None
+        self,
+        state: Contraction,
+        laplacian: Laplacian = ring_laplacian,
+        *,
+        watch: Callable[[Contraction], bool] | None = None,
     ) -> Contraction:
         """Contract by another Laplacian than that of the rings, such as that of a mesh.
 
@@ -115,7 +117,7 @@ class Contractor(Filter[Contraction]):
                     reducer = None  # as in the published code, which gives up after a pass without a merge
                 else:
                     elimination = Elimination()
-            if watch is not None and watch(state) is False and reason is None:
+            if watch is not None and not watch(state) and reason is None:
                 return _finished(state, STOPPED_BY_CALLER)
             if reason is not None:
                 keep = self.keep_last or len(state.report.iterations) == 1
@@ -216,7 +218,8 @@ def _reduced(state: Contraction, reducer: Reducer, start: float) -> Contraction:
     reduced = reducer(state)
     *done, last = reduced.report.iterations
     last = replace(last, n_merged=len(state) - len(reduced), seconds=time.perf_counter() - start)
-    return _noted(replace(reduced, report=with_filters(reduced.report, state.report)), iterations=(*done, last))
+    report = RunContext(state.report).report_of(reduced.report)
+    return _noted(reduced.with_report(report), iterations=(*done, last))
 
 
 def _finished(state: Contraction, reason: str, converged: bool = False) -> Contraction:

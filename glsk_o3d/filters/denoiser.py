@@ -1,7 +1,6 @@
 """Denoiser: points -> averaged where there are plenty, and noisy ones drawn to the ridge of their density."""
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -21,7 +20,7 @@ from ..geometry.neighbourhoods import (
 from ..geometry.pairing import Pairs, merge_pairs
 from ..geometry.vectors import PAIRS
 from ..parameters import documented, parameter
-from ..pipeline import Filter, Watch
+from ..pipeline import Filter, RunContext
 
 RIDGE_CHUNK = 1024  # speed: points at a time: the (3, points, 32) work arrays then stay in the cache
 MOST_IN_ONE = 4  # fitted: noisy points that are averaged in a pass
@@ -31,7 +30,7 @@ DENOISED_RATIO = 1.8  # fitted: local outlier ratio of a denoised outlier
 
 @documented
 @dataclass(frozen=True, kw_only=True)
-class Denoiser(Filter[Points]):
+class Denoiser(Filter[Points, Points]):
     """Average dense noisy points, then move noisy points to the ridge of their density.
 
     A neighbourhood narrower than the noise is a ball and does not show the surface. The mean of several points has less
@@ -50,9 +49,6 @@ class Denoiser(Filter[Points]):
     True
     """
 
-    consumes: ClassVar[type] = Points
-    produces: ClassVar[type] = Points
-
     denoise: int = parameter(
         4,
         "Passes that draw the points of noisy neighbourhoods to the ridge of their density. 0 leaves all as it is.",
@@ -60,7 +56,7 @@ class Denoiser(Filter[Points]):
         low=0,
     )
 
-    def _run(self, points: Points, watch: Watch | None) -> Points:
+    def run(self, points: Points, context: RunContext) -> Points:
         if not self.denoise:
             return points
         points.check_whole(self)

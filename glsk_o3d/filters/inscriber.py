@@ -1,17 +1,16 @@
 """Inscriber: rings -> rings around places on the medial axis."""
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 from ..data.contraction import Contraction
 from ..geometry.inscribed_balls import medial_places
 from ..parameters import documented, parameter
-from ..pipeline import Filter, Watch
+from ..pipeline import Filter, RunContext
 
 
 @documented
 @dataclass(frozen=True, kw_only=True)
-class Inscriber(Filter[Contraction]):
+class Inscriber(Filter[Contraction, Contraction]):
     """Move each point into the object, to the centre of the ball that touches it from inside, before it is contracted.
 
     Contraction shuts a hole that is narrower than the bars beside it, since its wall is bent more than theirs; from the
@@ -34,10 +33,8 @@ class Inscriber(Filter[Contraction]):
     1
     """
 
-    consumes: ClassVar[type] = Contraction
-
     share: float = parameter(1.0, "How far points go, over the way to the places and their trust.", low=0, high=1)
 
-    def _run(self, state: Contraction, watch: Watch | None) -> Contraction:
+    def run(self, state: Contraction, context: RunContext) -> Contraction:
         places, trust = medial_places(state.positions, state.normals[state.survivors], state.rings)
         return replace(state, positions=state.positions + self.share * trust[:, None] * (places - state.positions))

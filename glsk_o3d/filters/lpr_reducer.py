@@ -1,7 +1,7 @@
 """LPRReducer: local point reduction (Wen et al. 2024, section II-C and algorithm 1)."""
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from ..geometry.neighbourhoods import plane_axes
 from ..geometry.rings import Rings, star_rings
 from ..geometry.vectors import Floats, dot, norm
 from ..parameters import documented, parameter
-from ..pipeline import Filter, Watch
+from ..pipeline import Filter, RunContext
 
 PSI_FACTOR = 1.2  # published: psi' over psi
 AMPLIFICATION_SQUARED = 9  # published: s_L squared, in the code and not in the paper
@@ -23,7 +23,7 @@ MIN_SHRINKAGE = 1e-4  # published: floor of s - psi' s(0) in the working frame, 
 
 @documented
 @dataclass(frozen=True, kw_only=True)
-class LPRReducer(Filter[Contraction]):
+class LPRReducer(Filter[Contraction, Contraction]):
     r"""Merge each point with its nearest ring neighbour if that costs little: one pass.
 
     A point i may take over its nearest ring neighbour m if :math:`F = V_1 - V_2 + 3 U < \varphi s_i^2`. Its new ring is
@@ -61,8 +61,6 @@ class LPRReducer(Filter[Contraction]):
     True
     """
 
-    consumes: ClassVar[type] = Contraction
-
     phi: float = parameter(1e5, "Merge where F is below phi times the squared ring size.", low=0, open_low=True)
     conserve_mass: bool = parameter(True, "Survivors take over the mass of merged points.")
     mend_rings: bool = parameter(
@@ -75,7 +73,7 @@ class LPRReducer(Filter[Contraction]):
     )
     least: int = parameter(0, "Merge nothing once no more survivors are left.", unit="points", low=0)
 
-    def _run(self, state: Contraction, watch: Watch | None) -> Contraction:
+    def run(self, state: Contraction, context: RunContext) -> Contraction:
         if not state.report.iterations:
             raise StageError("LPRReducer compares ring sizes before and after a contraction: run Contractor first")
         if len(state) <= self.least:

@@ -1,7 +1,6 @@
 """OutlierRemover: points -> those that are no outliers, single points far from all others or clusters that float."""
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from ..geometry.groups import component_labels
 from ..geometry.neighbourhoods import local_outlier_ratio, mean_distances, nearest_neighbours, principal, row_medians
 from ..geometry.vectors import TINY
 from ..parameters import documented, parameter
-from ..pipeline import Filter, Watch
+from ..pipeline import Filter, RunContext
 
 # All fitted, on clouds with outliers of 1 to 10 %, sparse limbs and crowns.
 MOST_ROUNDS = 20  # speed: clouds need less than ten, but spirals that get ever sparser one for every point
@@ -30,7 +29,7 @@ MIXED_OR_TWIGS = (
 
 @documented
 @dataclass(frozen=True, kw_only=True)
-class OutlierRemover(Filter[Points]):
+class OutlierRemover(Filter[Points, Points]):
     """Set outliers aside: later filters ignore them, but each belongs to the vertex of the nearest point.
 
     An outlier is far from its neighbours, relative to their spacing, in a small isolated cluster, or a mixed pixel of a
@@ -51,16 +50,13 @@ class OutlierRemover(Filter[Points]):
     array([500])
     """
 
-    consumes: ClassVar[type] = Points
-    produces: ClassVar[type] = Points
-
     outlier_factor: float = parameter(
         2.5,
         "Ratio of a point's distance to its neighbours over theirs above which it is an outlier. 0 keeps all.",
         low=0,
     )
 
-    def _run(self, points: Points, watch: Watch | None) -> Points:
+    def run(self, points: Points, context: RunContext) -> Points:
         if not self.outlier_factor:
             return points
         points.check_whole(self)

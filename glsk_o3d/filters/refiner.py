@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal
+from typing import Literal
 
 from ..curve.axis.fit import fit_axis, pull_back_detached
 from ..curve.axis.subdivision import subdivide_edges
@@ -24,7 +24,7 @@ from ..curve.topology.spurs import Limbs
 from ..data.decisions import Decision
 from ..data.skeleton import Skeleton
 from ..parameters import documented, parameter
-from ..pipeline import Filter, Watch
+from ..pipeline import Filter, RunContext
 
 QUESTIONS: tuple[type[Question], ...] = (Loops, Limbs, FalseBranches, Limbs, Gaps, Loops, Limbs)
 """In this order: cuts and bridges may make spurs, and bridges loops, so these are asked about again."""
@@ -32,7 +32,7 @@ QUESTIONS: tuple[type[Question], ...] = (Loops, Limbs, FalseBranches, Limbs, Gap
 
 @documented
 @dataclass(frozen=True, kw_only=True)
-class Refiner(Filter[Skeleton]):
+class Refiner(Filter[Skeleton, Skeleton]):
     """Make the graph one-dimensional, close false loops, prune spurs, and centre it in the surface around it.
 
     1. Edges on triangles are collapsed, the shortest first, until there is no triangle. This step is published; with
@@ -69,9 +69,6 @@ class Refiner(Filter[Skeleton]):
     (1, 0)
     """
 
-    consumes: ClassVar[type] = Skeleton
-    produces: ClassVar[type] = Skeleton
-
     collapse: Literal["length", "degree"] = parameter(
         "length",
         "Edge of a triangle to collapse first: the shortest, or that with the least mean degree of its ends.",
@@ -106,7 +103,7 @@ class Refiner(Filter[Skeleton]):
         choices=("medial", "surface"),
     )
 
-    def _run(self, skeleton: Skeleton, watch: Watch | None) -> Skeleton:
+    def run(self, skeleton: Skeleton, context: RunContext) -> Skeleton:
         curve = Curve.of(skeleton)
         if not self.recentre:  # every point keeps its vertex
             return on_points(self._refined, curve, along_a_morton_curve(curve)).to_skeleton()

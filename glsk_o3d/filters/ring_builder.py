@@ -1,7 +1,7 @@
 """RingBuilder: points -> one-rings (Wen et al. 2024, section II-A)."""
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from ..errors import InvalidParameterError
 from ..geometry.neighbourhoods import nearest_neighbours, plane_axes, principal
 from ..geometry.rings import star_rings
 from ..parameters import documented, parameter, resolve_length
-from ..pipeline import Filter, Watch
+from ..pipeline import Filter, RunContext
 
 LEAST_RING = 3  # derived: neighbours that a radius leaves, at least
 
@@ -23,7 +23,7 @@ def published_k(n: int) -> int:
 
 @documented
 @dataclass(frozen=True, kw_only=True)
-class RingBuilder(Filter[Contraction]):
+class RingBuilder(Filter[Points, Contraction]):
     """Give every point its one-ring.
 
     The ring of a point is its Delaunay star among its k nearest neighbours, projected on their principal plane. A cloud
@@ -48,8 +48,6 @@ class RingBuilder(Filter[Contraction]):
     (500, True)
     """
 
-    consumes: ClassVar[type] = Points
-
     k: int | Literal["auto", "published"] = parameter(
         "auto",
         "Neighbours per point, itself included; at most all. More bridge noise and gaps, fewer keep thin parts apart. "
@@ -69,7 +67,7 @@ class RingBuilder(Filter[Contraction]):
         open_low=True,
     )
 
-    def _run(self, points: Points, watch: Watch | None) -> Contraction:
+    def run(self, points: Points, context: RunContext) -> Contraction:
         cloud = points.cloud[points.survivors]
         neighbours, normals = self.neighbourhoods(points, cloud)
         if np.array_equal(points.ring_normals, points.normals):  # no point was moved or merged

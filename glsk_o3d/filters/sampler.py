@@ -1,16 +1,17 @@
 """Sampler: cloud -> points in a working frame, of a large cloud a sample."""
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Literal
+from typing import Literal
 
 from ..data.points import Points, default_size
+from ..interop.clouds import Cloud
 from ..parameters import documented, parameter
-from ..pipeline import Filter, Watch
+from ..pipeline import Filter, RunContext
 
 
 @documented
 @dataclass(frozen=True, kw_only=True)
-class Sampler(Filter[Points]):
+class Sampler(Filter[Cloud, Points]):
     """Bring a cloud into its working frame: centred, longest side 1.6, in Morton order and without duplicates.
 
     Points that differ by rounding become one. The sample of a large cloud has the points nearest to the means of the
@@ -29,8 +30,6 @@ class Sampler(Filter[Points]):
     >>> len(points) < 1500, points.points.shape
     (True, (5000, 3))
     """
-
-    produces: ClassVar[type] = Points
 
     size: int | Literal["auto", "all"] = parameter(
         "auto",
@@ -57,7 +56,7 @@ class Sampler(Filter[Points]):
     )
     drop_invalid: bool = parameter(False, "Drop points with NaN or infinite coordinates instead of refusing.")
 
-    def _run(self, cloud: Any, watch: Watch | None) -> Points:
+    def run(self, cloud: Cloud, context: RunContext) -> Points:
         points = Points.of(cloud, self.sample_size, self.frame, self.drop_invalid, self.sample)
         if isinstance(self.sample, str) or points.report.n_by_area:
             return points

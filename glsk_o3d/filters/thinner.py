@@ -1,7 +1,7 @@
 """Thinner: points -> fewer of them where there are more than it takes."""
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -13,7 +13,7 @@ from ..geometry.pairing import Pairs, merge_pairs
 from ..geometry.rows import reach_next_rows
 from ..geometry.vectors import TINY, norm
 from ..parameters import documented, parameter
-from ..pipeline import Filter, Watch
+from ..pipeline import Filter, RunContext
 
 ASK_AGAIN = 0.25  # speed: share of the points left, below which the neighbours are looked up anew
 PACKED = 0.42  # measured: points left on an area of 1 if none are to be nearer than 1
@@ -27,7 +27,7 @@ WIDER_BIAS = 1.25  # measured: on tubes with 18 to 80 points around them, noise 
 
 @documented
 @dataclass(frozen=True, kw_only=True)
-class Thinner(Filter[Points]):
+class Thinner(Filter[Points, Points]):
     """Merge near points where a part has more points than a skeleton needs.
 
     No point moves, and the one that stays takes over the mass. Gaps stay smaller than in a random sample, and thin
@@ -41,9 +41,6 @@ class Thinner(Filter[Points]):
     >>> len(points) < 2500, len(points.cloud)
     (True, 5000)
     """
-
-    consumes: ClassVar[type] = Points
-    produces: ClassVar[type] = Points
 
     around: float = parameter(
         20.0,
@@ -62,7 +59,7 @@ class Thinner(Filter[Points]):
         choices=("auto", "all"),
     )
 
-    def _run(self, points: Points, watch: Watch | None) -> Points:
+    def run(self, points: Points, context: RunContext) -> Points:
         if self.thin_to == "all":
             return points
         before = np.inf

@@ -2,7 +2,7 @@
 
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -14,12 +14,12 @@ from ..curve.thin.trace import trace
 from ..data.skeleton import Skeleton
 from ..geometry.vectors import AXES
 from ..parameters import documented, parameter
-from ..pipeline import Filter, Watch
+from ..pipeline import Filter, RunContext
 
 
 @documented
 @dataclass(frozen=True, kw_only=True)
-class Tracer(Filter[Skeleton]):
+class Tracer(Filter[Skeleton, Skeleton]):
     """Trace parts without a visible surface, such as twigs thinner than the point spacing; make one tree with a root.
 
     Where the cloud shows no surface, shortest paths through the points replace the curve. With a `root` the result is
@@ -44,9 +44,6 @@ class Tracer(Filter[Skeleton]):
     (1, 0, 3)
     """
 
-    consumes: ClassVar[type] = Skeleton
-    produces: ClassVar[type] = Skeleton
-
     surface: float = parameter(
         LEAST_SURFACE,
         "Share of points with a surface below which a region is traced as paths. 0 traces none.",
@@ -70,7 +67,7 @@ class Tracer(Filter[Skeleton]):
                     object.__setattr__(self, "root", ",".join(map(repr, point.tolist())))
         super().__post_init__()
 
-    def _run(self, skeleton: Skeleton, watch: Watch | None) -> Skeleton:
+    def run(self, skeleton: Skeleton, context: RunContext) -> Skeleton:
         curve = Curve.of(skeleton)
         if self.root is None and not (self.surface and may_lack_surface(curve, self.surface)):
             return skeleton  # as most are: sorting many points would take longer than all else

@@ -113,7 +113,7 @@ def finite_blocks(
     return dropped
 
 
-def points_for(pipeline: Pipeline[Any], path: str | os.PathLike[str], where: str | None = None) -> Any:
+def points_for(pipeline: Pipeline[Any, Any], path: str | os.PathLike[str], where: str | None = None) -> Any:
     """What a pipeline takes of a file: its points and triangles, or a sample of the points.
 
     The sample, as of `read_sample`, is taken where the file has more than ten million points and the pipeline does not

@@ -32,7 +32,7 @@ def serves(cls: type[Parameters], kind: str) -> bool:
     return kind == "filter" or (kind == "reducer" and cls.consumes is cls.produces is Contraction)
 
 
-def known_pipelines() -> dict[str, Callable[[], Pipeline[Any]]]:
+def known_pipelines() -> dict[str, Callable[[], Pipeline[Any, Any]]]:
     """All pipelines by name, those of plugins after the built-in ones.
 
     Returns
@@ -43,7 +43,7 @@ def known_pipelines() -> dict[str, Callable[[], Pipeline[Any]]]:
     return {**PIPELINES, **plugins(PIPELINE_GROUP)}
 
 
-def named_pipeline(name: str) -> Pipeline[Any]:
+def named_pipeline(name: str) -> Pipeline[Any, Any]:
     """The pipeline of that name, built in or of a plugin; InvalidParameterError suggests one if there is none.
 
     Parameters

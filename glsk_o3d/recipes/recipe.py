@@ -18,7 +18,7 @@ RECIPE_ENDING = ".json"
 """Of files that hold recipes."""
 
 
-def to_recipe(pipeline: Pipeline[Any]) -> dict[str, Any]:
+def to_recipe(pipeline: Pipeline[Any, Any]) -> dict[str, Any]:
     """A pipeline as a recipe, with every parameter in it.
 
     Parameters
@@ -48,7 +48,7 @@ def to_recipe(pipeline: Pipeline[Any]) -> dict[str, Any]:
     return recipe
 
 
-def save_recipe(pipeline: Pipeline[Any], path: str | os.PathLike[str]) -> None:
+def save_recipe(pipeline: Pipeline[Any, Any], path: str | os.PathLike[str]) -> None:
     """Write a pipeline as a recipe, with every parameter in it, as JSON.
 
     Parameters
@@ -80,7 +80,7 @@ def _check_ending(path: str | os.PathLike[str]) -> None:
         raise RecipeError(f"{os.fspath(path)}: unknown ending; recipes are {RECIPE_ENDING} files")
 
 
-def load_recipe(path: str | os.PathLike[str]) -> Pipeline[Any]:
+def load_recipe(path: str | os.PathLike[str]) -> Pipeline[Any, Any]:
     """Read a pipeline from a recipe.
 
     Parameters
@@ -121,7 +121,7 @@ def load_recipe(path: str | os.PathLike[str]) -> Pipeline[Any]:
         raise RecipeError(f"{os.fspath(path)}: {error}") from None
 
 
-def from_recipe(recipe: dict[str, Any]) -> Pipeline[Any]:
+def from_recipe(recipe: dict[str, Any]) -> Pipeline[Any, Any]:
     """The pipeline that a recipe describes.
 
     Parameters
@@ -149,7 +149,7 @@ def from_recipe(recipe: dict[str, Any]) -> Pipeline[Any]:
     if not isinstance(stages, list) or not stages:
         raise RecipeError(f"pipeline: must be a list of at least one stage, not {shown(stages)}")
     read: list[Any] = [_part(stage, f"pipeline[{i}]", "filter") for i, stage in enumerate(stages)]
-    pipeline: Pipeline[Any] = _valid(lambda: Pipeline(*read), "pipeline")
+    pipeline: Pipeline[Any, Any] = _valid(lambda: Pipeline(*read), "pipeline")
     return pipeline
 
 

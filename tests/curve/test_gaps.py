@@ -7,7 +7,7 @@ import pytest
 
 from glsk_o3d import Skeleton, Tracer, pipelines, samples
 from glsk_o3d.curve.thin.detect import LEAST_POINTS, without_strays
-from glsk_o3d.curve.topology.collapse import scaled, with_gaps
+from glsk_o3d.curve.merging import scaled, with_gaps
 
 pytestmark = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d import Connector, Contractor, pipelines
-from glsk_o3d.curve.topology.collapse import collapse_triangles
+from glsk_o3d.curve.merging import collapse_triangles
 from glsk_o3d.curve.topology.evidence import Evidence
 from glsk_o3d.curve.topology.loops import close_loops, loop_facts
 from glsk_o3d.geometry.cycles import minimum_cycle_basis

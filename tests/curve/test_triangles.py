@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glsk_o3d import Skeleton
-from glsk_o3d.curve.topology.collapse import merge_vertices
+from glsk_o3d.curve.merging import merge_vertices
 
 
 def slow(skeleton, by_degree):

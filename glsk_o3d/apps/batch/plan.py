@@ -80,7 +80,7 @@ def plan_batch(
     inputs: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
     out_dir: str | os.PathLike[str],
     *,
-    pipeline: Pipeline[Any] | Filter[Any] | str | os.PathLike[str] = "default",
+    pipeline: Pipeline[Any, Any] | Filter[Any, Any] | str | os.PathLike[str] = "default",
     formats: Sequence[str] = ("ply",),
     preview: bool = False,
     cut_loops: bool = False,
@@ -190,7 +190,7 @@ def _endings(formats: Sequence[str], preview: bool) -> list[str]:
     return endings
 
 
-def _cut(pipeline: Pipeline[Any], where: str | None, tiles: Any, overlap: Any) -> Cut | None:
+def _cut(pipeline: Pipeline[Any, Any], where: str | None, tiles: Any, overlap: Any) -> Cut | None:
     """How scenes are to be taken apart, if they are."""
     if tiles is None:
         if overlap is not None:

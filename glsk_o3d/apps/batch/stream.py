@@ -53,7 +53,7 @@ class Skeletonizer:
 
     def __init__(self, pipeline: PipelineChoice = "default", *, workers: int = 1, **options: Any) -> None:
         check_number("workers", workers, "int", low=1)
-        self.pipeline: Pipeline[Skeleton] = chosen_pipeline(pipeline, options)
+        self.pipeline: Pipeline[Any, Skeleton] = chosen_pipeline(pipeline, options)
         self._count, self._pool = workers, LocalWorkers(workers)
         self._recipe = to_recipe(self.pipeline) if workers > 1 else {}
 

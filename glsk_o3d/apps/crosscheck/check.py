@@ -90,7 +90,7 @@ class CrossCheck:
         }
 
 
-def cross_check(cloud: Any, *, pipeline: Pipeline[Any] | str = "default", mesh: Any = "auto") -> CrossCheck:
+def cross_check(cloud: Any, *, pipeline: Pipeline[Any, Any] | str = "default", mesh: Any = "auto") -> CrossCheck:
     """Check a cloud's Laplacian and skeleton against those of a mesh, computed with libigl (Au et al. 2008).
 
     Parameters

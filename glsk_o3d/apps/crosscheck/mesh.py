@@ -27,7 +27,7 @@ from .solid import Solid
 LEAST_MASS = 0.05  # fitted: of the mean, that a vertex of slivers has
 
 
-def mesh_skeleton(solid: Solid, pipeline: Pipeline[Any]) -> Skeleton:
+def mesh_skeleton(solid: Solid, pipeline: Pipeline[Any, Any]) -> Skeleton:
     """Skeleton of a mesh, contracted from its medial places by libigl's Laplacian (Au et al. 2008; Tagliasacchi 2012).
 
     The pipeline's Contractor and later filters lend their parameters; reductions are left out, and gaps of the mesh

@@ -122,7 +122,7 @@ class Verb:
         meanings = [f"{name} : {slot.facts['doc']}" for name, slot in self.slots.items()]
         return "\n".join([self.doc, "", *meanings])
 
-    def plan(self, values: Mapping[str, Any]) -> Pipeline[Any]:
+    def plan(self, values: Mapping[str, Any]) -> Pipeline[Any, Any]:
         """The pipeline with such parameters; InvalidParameterError for a name or a value that is wrong.
 
         So are those of a filter that is not in it.
