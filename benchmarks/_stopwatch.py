@@ -47,8 +47,8 @@ STAGES = {
     "thinning": Stage("geometry.grid_sampling:sample_grid filters.thinner:thin,spacing_enough,thin_nearer"),
     "rings": Stage("geometry.rings:star_rings"),
     "rest of the rings": Stage(
-        "filters.sampler:Sampler._run filters.outlier_remover:OutlierRemover._run filters.denoiser:Denoiser._run "
-        "filters.thinner:Thinner._run filters.ring_builder:RingBuilder._run",
+        "filters.sampler:Sampler.run filters.outlier_remover:OutlierRemover.run filters.denoiser:Denoiser.run "
+        "filters.thinner:Thinner.run filters.ring_builder:RingBuilder.run",
         open=True,
     ),
     "Laplacian": Stage("geometry.cotangent:cotangent_laplacian"),
@@ -56,11 +56,11 @@ STAGES = {
     "normal matrix": Stage("geometry.solver:solve_contraction", open=True),
     "factorisation": Stage("geometry.solver:factorised"),
     "refinement of the solve": Stage(after=("normal matrix", "factorisation"), open=True),
-    "LPR": Stage("filters.lpr_reducer:LPRReducer._run"),
-    "rest of the contraction": Stage("filters.contractor:Contractor._run", open=True),
+    "LPR": Stage("filters.lpr_reducer:LPRReducer.run"),
+    "rest of the contraction": Stage("filters.contractor:Contractor.run", open=True),
     "sampling": Stage("filters.connector:contraction_distance geometry.farthest_point:farthest_point_sampling"),
-    "connection": Stage("filters.connector:Connector._run", open=True),
-    "refinement of the graph": Stage("filters.refiner:Refiner._run"),
+    "connection": Stage("filters.connector:Connector.run", open=True),
+    "refinement of the graph": Stage("filters.refiner:Refiner.run"),
 }
 """The stages in the order of the tables, and the functions that do their work: to be kept as the package is."""
 SHARES = {

@@ -217,7 +217,7 @@ class Pipeline(Generic[In, Out]):
         if isinstance(data, FLOWS[1:]):
             data = data.with_report(context.report_of(report))
         result: Any = of_input(data) if isinstance(data, Skeleton) else data
-        return result  # type: ignore[no-any-return]
+        return result
 
     def check_complete(self) -> None:
         """Raise InvalidParameterError unless the pipeline leads from a cloud to a skeleton."""

@@ -74,7 +74,7 @@ def no_run(monkeypatch):
     def run(self, data, watch):
         pytest.fail("computed before everything was checked")
 
-    monkeypatch.setattr(RingBuilder, "_run", run)
+    monkeypatch.setattr(RingBuilder, "run", run)
 
 
 @pytest.fixture(scope="session")

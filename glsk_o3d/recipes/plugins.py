@@ -79,7 +79,7 @@ def _check_filter(name: str, cls: Any) -> None:
             raise _Unfit("a stopping rule must be callable")
     elif cls.consumes not in FLOWS or cls.produces not in FLOWS or (cls.produces is Cloud is not cls.consumes):
         raise _Unfit(f"there is no filter from {cls.consumes} to {cls.produces}")
-    elif cls.run is Filter._run:
+    elif cls.run is Filter.run:
         raise _Unfit("it has no method run")
     cls().check()
 

@@ -120,7 +120,7 @@ def test_output_that_nobody_takes_is_one_line_and_no_success(tmp_path, y, words,
 
 
 def test_bugs_keep_their_traceback(invoke, scans, monkeypatch):
-    monkeypatch.setattr(glsk_o3d.Refiner, "_run", lambda *_: 1 / 0)
+    monkeypatch.setattr(glsk_o3d.Refiner, "run", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         invoke("skeletonize", scans / "sample.ply", "-o", "s.ply")
 
@@ -129,5 +129,5 @@ def test_ctrl_c_in_a_run(refused, scans, monkeypatch):
     def interrupted(self, data, on_iteration):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(glsk_o3d.RingBuilder, "_run", interrupted)
+    monkeypatch.setattr(glsk_o3d.RingBuilder, "run", interrupted)
     assert refused(130, "skeletonize", scans / "sample.ply", "-o", "s.ply") == "interrupted; no file is half-written"

@@ -174,13 +174,13 @@ def test_a_large_scan_is_read_in_blocks(invoke, tmp_path, write_scan, monkeypatc
 
 def test_a_close_call_comes_with_the_option_that_answers_otherwise(invoke, scans, monkeypatch):
     call = glsk_o3d.Decision("gap", (1.0, 2.0, 3.0), 0.42, changed=False)
-    real = glsk_o3d.Refiner._run
+    real = glsk_o3d.Refiner.run
 
     def doubtful(self, data, watch):
         skeleton = real(self, data, watch)
         return replace(skeleton, report=replace(skeleton.report, decisions=(call,)))
 
-    monkeypatch.setattr(glsk_o3d.Refiner, "_run", doubtful)
+    monkeypatch.setattr(glsk_o3d.Refiner, "run", doubtful)
     told = "the object goes on across the gap at (1, 2, 3): 0.42, gap left; if that is wrong: --set Refiner.bridge=0.41"
     assert told in invoke("skeletonize", scans / "ring.ply", "-o", "s.json").stdout
 

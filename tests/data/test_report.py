@@ -91,7 +91,7 @@ class Doubt(Filter[Contraction]):
     consumes: ClassVar[type] = Contraction
     produces: ClassVar[type] = Contraction
 
-    def _run(self, given, watch):
+    def run(self, given, context):
         return replace(given, report=given.report.with_warning("doubtful: so it is"))
 
 

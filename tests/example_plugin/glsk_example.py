@@ -24,7 +24,7 @@ class Voxel(Filter):
         "2%", "Side of a cell.", type="length", unit="cloud's units, or % of the diagonal", low=0, open_low=True
     )
 
-    def _run(self, cloud, watch):
+    def run(self, cloud, context):
         points = cloud_points(cloud)
         low, high = points.min(axis=0), points.max(axis=0)
         size = resolve_length(self.size, float(np.linalg.norm(high - low)))
@@ -43,7 +43,7 @@ class RadiusFloor(Filter):
 
     share: float = parameter(0.5, "Least radius over the median radius.", type="float", low=0)
 
-    def _run(self, skeleton, watch):
+    def run(self, skeleton, context):
         return replace(skeleton, radii=np.maximum(skeleton.radii, self.share * np.median(skeleton.radii)))
 
 

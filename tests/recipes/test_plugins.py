@@ -121,7 +121,7 @@ def test_filters_of_clouds_stand_in_front_and_in_a_row(example):
 
 
 def made(produces, run):
-    return type("Made", (Filter,), {"produces": produces, "_run": run, "check": lambda self: None})()
+    return type("Made", (Filter,), {"produces": produces, "run": run, "check": lambda self: None})()
 
 
 @pytest.mark.parametrize(
@@ -160,7 +160,7 @@ NO_FILTER = "it is no frozen dataclass derived from glsk_o3d.Filter"
 
 
 def field(words):
-    return FROZEN.format("Filter", f"a: int = parameter({words})", "_run = print")
+    return FROZEN.format("Filter", f"a: int = parameter({words})", "run = print")
 
 
 BROKEN_FILTERS = [
@@ -169,14 +169,14 @@ BROKEN_FILTERS = [
     ("class Panic(BaseException): pass\nraise Panic('rust')", "Panic: rust"),
     ("", "has no attribute 'Thing'"),
     ("class Thing: pass", NO_FILTER),
-    ("@dataclass\nclass Thing(Filter): _run = print", NO_FILTER),
-    ("@dataclass(frozen=True)\nclass Other(Filter): _run = print\nThing = Other", "the name of the class, 'Other'"),
-    (FROZEN.format("Filter", "a: int = 3", "_run = print"), "its field 'a' is not made by glsk_o3d.parameters"),
+    ("@dataclass\nclass Thing(Filter): run = print", NO_FILTER),
+    ("@dataclass(frozen=True)\nclass Other(Filter): run = print\nThing = Other", "the name of the class, 'Other'"),
+    (FROZEN.format("Filter", "a: int = 3", "run = print"), "its field 'a' is not made by glsk_o3d.parameters"),
     (field("3, 'A.', type='int'").replace("a:", "rule:"), "its field 'rule' is not made by"),
     (field("3, 'A.', type='int', low=4"), "InvalidParameterError: Thing.a = 3: must be at least 4"),
-    (FROZEN.format("Filter", "consumes = 'mesh'", "_run = print"), "there is no filter from mesh to "),
-    (FROZEN.format("Filter", "consumes, produces = Skeleton, Cloud", "_run = print"), "there is no filter from "),
-    (FROZEN.format("Filter", "pass", ""), "it has no method _run"),
+    (FROZEN.format("Filter", "consumes = 'mesh'", "run = print"), "there is no filter from mesh to "),
+    (FROZEN.format("Filter", "consumes, produces = Skeleton, Cloud", "run = print"), "there is no filter from "),
+    (FROZEN.format("Filter", "pass", ""), "it has no method run"),
     (FROZEN.format("Parameters", "pass", ""), "a stopping rule must be callable"),
 ]
 BROKEN_PIPELINES = [
@@ -216,7 +216,7 @@ def test_a_broken_one_warns_and_the_others_stay(install, group, code, cause):
 @pytest.mark.usefixtures("example")
 def test_names_that_are_taken(install, name, owner):
     before = catalogue().get(name)
-    code = HEAD + FROZEN.format("Filter", "_run = print", "").replace("Thing", name)
+    code = HEAD + FROZEN.format("Filter", "run = print", "").replace("Thing", name)
     install("zz-later", "1", code, f"[glsk_o3d.filters]\n{name} = zz_later:{name}\n")
     assert only_warning(catalogue).endswith(f" left out: the name is that of {owner}")
     assert {"Voxel", "RadiusFloor", "SolveCount"} <= catalogue().keys()

@@ -38,7 +38,7 @@ class Saboteur(Filter):
 
     consumes = produces = Cloud
 
-    def _run(self, cloud, watch):
+    def run(self, cloud, context):
         points = cloud_points(cloud)
         order = int(points[0, 0]) // 1000 * 1000
         if order == 1000:

@@ -184,7 +184,7 @@ def test_a_writer_that_fails_and_a_mistake_in_the_code(run, scans, rows, monkeyp
     assert (found["status"], found["outputs"], found["loops"]) == ("failed", ["a.ply"], 1)
     run([scans / "a.ply"], formats=["swc"], cut_loops=True, preview=True)
     assert rows()["a"]["outputs"] == ["a.swc", "a.png"]
-    monkeypatch.setattr(glsk_o3d.Refiner, "_run", lambda *_: 1 / 0)
+    monkeypatch.setattr(glsk_o3d.Refiner, "run", lambda *_: 1 / 0)
     run([scans / "b.ply"])
     assert rows()["b"]["error"] == "ZeroDivisionError: division by zero"
 
