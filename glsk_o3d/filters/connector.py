@@ -79,9 +79,9 @@ class Connector(Filter[Contraction, Skeleton]):
         survivor = state.survivor_of_point
         vertex_of_point = np.where(survivor >= 0, vertex_of_survivor[survivor], -1)
         # copies, and what a sample stands for, count with one point
-        once = np.where(state.sampled, vertex_of_point, -1)
+        once = np.where(state.map.sampled, vertex_of_point, -1)
         normals = np.full_like(state.points, np.nan)
-        normals[state.has_normal] = state.normals[state.representative_of_point[state.has_normal]]
+        normals[state.has_normal] = state.normals[state.map.row_of_point[state.has_normal]]
         return Skeleton(
             vertices=vertices,
             edges=self._edges(state, vertex_of_survivor),
@@ -107,6 +107,7 @@ class Connector(Filter[Contraction, Skeleton]):
 
 def contraction_distance(state: Contraction) -> np.ndarray:
     """Median distance in the frame, smoothed over 16, of each survivor's points to where they were contracted."""
-    distance = group_median(norm(state.cloud - state.positions[state.representative]), state.representative, len(state))
+    survivor = state.map.survivor_of_row
+    distance = group_median(norm(state.cloud - state.positions[survivor]), survivor, len(state))
     _, neighbours = nearest_neighbours(state.positions, min(16, len(state)))
     return row_medians(distance.take(neighbours))

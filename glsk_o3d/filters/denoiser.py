@@ -1,6 +1,6 @@
 """Denoiser: points -> averaged where there are plenty, and noisy ones drawn to the ridge of their density."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -68,7 +68,7 @@ def averaged(points: Points) -> Points:
     while np.count_nonzero(points.noise) >= 2 * ENOUGH_POINTS:
         row, mean, weight = average_noisy(points.cloud, points.neighbours, points.noise, points.weight, ENOUGH_POINTS)
         neighbours = nearest_neighbours(mean, default_k(len(mean)))[1]
-        points = points.remade(row, mean, neighbours, weight=weight, merged=np.bincount(row, points.merged))
+        points = points.with_rows(row, mean, neighbours, weight=weight, merged=np.bincount(row, points.merged))
         if 2 * len(mean) > len(row):
             break
     return points
@@ -92,9 +92,9 @@ def to_ridges(points: Points, passes: int) -> Points:
     if len(left) < len(denoised):
         row[outlier] = cKDTree(denoised[left]).query(denoised[outlier])[1]
         denoised, neighbours = denoised[left], nearest_left(denoised, neighbours, ~outlier, k)
-        points = points.aside(outlier)
+        points = replace(points, map=points.map.set_aside(outlier))
     kept = {name: getattr(points, name)[left] for name in ("weight", "merged", "noise", "normals")}
-    return points.remade(row, denoised, neighbours, **kept)
+    return points.with_rows(row, denoised, neighbours, **kept)
 
 
 def average_noisy(

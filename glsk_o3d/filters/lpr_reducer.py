@@ -82,7 +82,7 @@ class LPRReducer(Filter[Contraction, Contraction]):
         energy = merge_energy(state)
         candidates = np.flatnonzero(energy < self.phi * state.ring_size**2)  # Wen (12)
         if self.order == "index":
-            rank = state.point_of_survivor[candidates]
+            rank = state.map.point_of_survivor[candidates]
         else:
             with np.errstate(divide="ignore"):
                 rank = energy[candidates] / state.ring_size[candidates] ** 2
