@@ -14,6 +14,7 @@ from ..geometry.area_sampling import SurfaceSample, sample_by_area, vertices_mis
 from ..geometry.frame import Frame, not_finite, to_working_frame
 from ..geometry.grid_sampling import sample_cloud
 from ..geometry.neighbourhoods import principal, row_medians
+from ..geometry.numbers import fitted, speed
 from ..geometry.rows import reach_next_rows
 from ..geometry.vectors import TINY, Ints, finite_rows
 from ..interop.clouds import cloud_counts, surface_mesh, to_point_cloud
@@ -22,12 +23,19 @@ from .report import Report
 
 Working = TypeVar("Working", bound="WorkingCloud")
 
-# Fitted: median sphericity of clean neighbourhoods at most, and of nothing but noise.
-CLEAN_SPHERICITY, NOISE_SPHERICITY = 0.2, 0.35
-RIDGE_NEIGHBOURS = 32  # fitted: among which a ridge is sought: more than for rings, a noisy shell is thick
 
-ENOUGH = 2400  # fitted: points on a body without thin parts; fewer are not thinned
-MOST_CONTRACTED = 25000  # speed: points of most clouds that are contracted
+@dataclass(frozen=True)
+class PointNumbers:
+    """Numbers of the preparation of points that several filters share."""
+
+    clean: float = fitted(0.2, "median sphericity of clean neighbourhoods at most")
+    noisy: float = fitted(0.35, "median sphericity of neighbourhoods of nothing but noise")
+    ridge_neighbours: int = fitted(32, "neighbours among which a ridge is sought; a noisy shell is thick")
+    enough: int = fitted(2400, "points on a body without thin parts; fewer are not thinned")
+    most: int = speed(25000, "points of most clouds that are contracted")
+
+
+POINTS = PointNumbers()
 
 
 def default_k(n: int) -> int:
@@ -44,7 +52,7 @@ def default_size(n: int) -> int:
     More points make the axis hardly more exact, since neither noise nor the thickness of parts shrinks with their
     spacing; they only cost time.
     """
-    size: int = max(MOST_CONTRACTED, round(64 * np.sqrt(n)))
+    size: int = max(POINTS.most, round(64 * np.sqrt(n)))
     return min(n, size)
 
 
@@ -268,8 +276,8 @@ def _measured(cloud: np.ndarray, neighbours: np.ndarray) -> dict[str, Any]:
 
 def on_surface(mesh: tuple[np.ndarray, np.ndarray], sample: Any = "auto") -> SurfaceSample:
     """The points that stand for a mesh, by the option `sample` of the Sampler: none where its vertices do."""
-    if sample == "auto" and vertices_mislead(mesh, default_k, ENOUGH):
-        sample = MOST_CONTRACTED
+    if sample == "auto" and vertices_mislead(mesh, default_k, POINTS.enough):
+        sample = POINTS.most
     return sample_by_area(*mesh, 0 if isinstance(sample, str) else int(sample))
 
 
@@ -288,5 +296,5 @@ def noise_share(spread: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     "Dimensionality based scale selection in 3D lidar point clouds"); from 0.2 to 0.35 it is mapped to 0 to 1.
     """
     sphericity = row_medians((spread[:, 0] / np.maximum(spread[:, 2], TINY)).take(neighbours))
-    rise = (sphericity - CLEAN_SPHERICITY) / (NOISE_SPHERICITY - CLEAN_SPHERICITY)
+    rise = (sphericity - POINTS.clean) / (POINTS.noisy - POINTS.clean)
     return np.clip(rise, 0, 1)

@@ -8,17 +8,27 @@ import numpy as np
 from ..data.contraction import Contraction
 from ..errors import StageError
 from ..geometry.neighbourhoods import plane_axes
+from ..geometry.numbers import fitted, published
 from ..geometry.rings import Rings, star_rings
 from ..geometry.vectors import Floats, dot, norm
 from ..parameters import documented, parameter
 from ..pipeline import Filter, RunContext
 
-PSI_FACTOR = 1.2  # published: psi' over psi
-AMPLIFICATION_SQUARED = 9  # published: s_L squared, in the code and not in the paper
-CURVATURE_WEIGHT = 3  # published: of U in F
-IN_PLANE_SINE = 1e-3  # fitted: sine of the angle below which a direction counts as lying in the tangent plane
+
+@dataclass(frozen=True)
+class ReducerNumbers:
+    """Numbers of the LPRReducer."""
+
+    psi_factor: float = published(1.2, "psi' over psi")
+    amplification_squared: float = published(9, "s_L squared, in the code and not in the paper")
+    curvature: float = published(3, "weight of U in F")
+    in_plane: float = fitted(1e-3, "sine of the angle below which a direction lies in the tangent plane")
+    least_shrinkage: float = published(1e-4, "floor of s - psi' s(0) in the working frame")
+
+
+REDUCER = ReducerNumbers()
+
 OF_SURVIVORS = ("positions", "previous", "laplacian_coordinates", "mass", "ring_size0", "ring_size")
-MIN_SHRINKAGE = 1e-4  # published: floor of s - psi' s(0) in the working frame, as in the published code
 
 
 @documented
@@ -120,16 +130,18 @@ def merge_energy(state: Contraction) -> np.ndarray:
     Minus infinity where a ring did not change.
     """
     s0, s, delta = state.ring_size0, state.ring_size, state.laplacian_coordinates
-    drop = PSI_FACTOR * state.ring_ratio_drop  # psi'
-    eta = np.maximum(s - drop * s0, MIN_SHRINKAGE) / s0  # Wen (11)
+    drop = REDUCER.psi_factor * state.ring_ratio_drop  # psi'
+    eta = np.maximum(s - drop * s0, REDUCER.least_shrinkage) / s0  # Wen (11)
     moved = norm(state.positions - state.previous)
     with np.errstate(divide="ignore", invalid="ignore"):
         pulled = np.nan_to_num(drop * s0 * moved / (eta * (s0 - s)), nan=0.0, posinf=np.inf, neginf=-np.inf)
-    contraction: Floats = (AMPLIFICATION_SQUARED * state.contraction_weight * eta) ** 2 * dot(delta, delta)  # Wen (7)
+    contraction: Floats = (REDUCER.amplification_squared * state.contraction_weight * eta) ** 2 * dot(
+        delta, delta
+    )  # Wen (7)
     attraction: Floats = pulled**2  # Wen (8)
     curved = delta - state.rings.mean_over(delta)
     curvature = dot(curved, curved)  # Wen (9)
-    return contraction - attraction + CURVATURE_WEIGHT * curvature  # Wen (6)
+    return contraction - attraction + REDUCER.curvature * curvature  # Wen (6)
 
 
 def combine_rings(state: Contraction, representatives: np.ndarray, swallowed: np.ndarray) -> Rings:
@@ -143,7 +155,7 @@ def combine_rings(state: Contraction, representatives: np.ndarray, swallowed: np
     delta = state.laplacian_coordinates[representatives]
     length = norm(delta)[:, None]
     # of a flat ring they are nothing but rounding, and lead anywhere
-    enough = IN_PLANE_SINE * np.maximum(length, state.ring_size[representatives, None])
+    enough = REDUCER.in_plane * np.maximum(length, state.ring_size[representatives, None])
     along = np.abs(dot(delta, normals))[:, None] > enough
     direction = np.where(along, np.divide(delta, length, out=np.zeros_like(delta), where=along), normals)
     return star_rings(state.cloud[state.survivors], representatives, union, plane_axes(direction))

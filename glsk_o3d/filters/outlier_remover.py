@@ -8,19 +8,30 @@ from ..data.points import Points
 from ..geometry.frame import MIN_POINTS
 from ..geometry.groups import component_labels
 from ..geometry.neighbourhoods import local_outlier_ratio, mean_distances, nearest_neighbours, principal, row_medians
+from ..geometry.numbers import fitted, speed
 from ..geometry.vectors import TINY
 from ..parameters import documented, parameter
 from ..pipeline import Filter, RunContext
 
-# All fitted, on clouds with outliers of 1 to 10 %, sparse limbs and crowns.
-MOST_ROUNDS = 20  # speed: clouds need less than ten, but spirals that get ever sparser one for every point
-DENSEST_HOPS = 4  # from neighbour to neighbour, within which the densest place is looked for
-FLOATING_RATIO = 5.0  # times as far from its neighbours as points there are: not for a surface that is only uneven
-FLOATING_SHARE = 0.1  # of all points that can float at most; more are a part of the object
-LIMB_NEIGHBOURS = 64  # among points far from theirs, that a limb of an object is longer than thick with
-MIXED_SHARE = 0.01  # of all points that surely are mixed pixels if there are any; fewer are at ends of a scan
-# least second and third over first principal spread of points that fill space
-FILLED_SECOND, FILLED_THIRD = 0.35, 0.1
+
+@dataclass(frozen=True)
+class OutlierNumbers:
+    """Numbers of the OutlierRemover, fitted on clouds with outliers of 1 to 10 %, sparse limbs and crowns."""
+
+    rounds: int = speed(20, "rounds; clouds need less than ten, but ever sparser spirals one a point")
+    hops: int = fitted(4, "hops between neighbours, within which the densest place is looked for")
+    floating_ratio: float = fitted(
+        5.0, "distance of points that float from their neighbours, over that of others there"
+    )
+    floating_share: float = fitted(0.1, "most share of points that float; more are a part of the object")
+    limb_neighbours: int = fitted(64, "neighbours among points far from theirs, with which a limb is longer than thick")
+    mixed_share: float = fitted(0.01, "least share of mixed pixels, if there are any; fewer are at ends of a scan")
+    filled_second: float = fitted(0.35, "least second over first principal spread of points that fill space")
+    filled_third: float = fitted(0.1, "least third over first principal spread of points that fill space")
+
+
+OUTLIER = OutlierNumbers()
+
 MIXED_OR_TWIGS = (
     "sparse points beside a surface may be mixed pixels of a depth camera or twigs, which cannot be told apart, and "
     "are kept: if they are of a camera, filter its flying pixels first"
@@ -91,11 +102,11 @@ def inliers(
     left, ascending, and their nearest neighbours among these, (m, k).
     """
     left = np.arange(len(points))
-    for _ in range(MOST_ROUNDS):  # what is left of a cluster stands out once the rest is gone
+    for _ in range(OUTLIER.rounds):  # what is left of a cluster stands out once the rest is gone
         # as near as the neighbours would be if all were there
         mean = distance / np.sqrt(weight[left].take(neighbours).mean(axis=1))
         found = (local_outlier_ratio(mean, neighbours) > factor) | mixed[left]
-        if mean.max() > FLOATING_RATIO * mean.min():  # else none can float
+        if mean.max() > OUTLIER.floating_ratio * mean.min():  # else none can float
             found |= in_floating_cluster(points[left], weight[left], mean, neighbours)
         keep = np.flatnonzero(~found)
         if len(keep) == len(left) or len(keep) < least:
@@ -120,20 +131,20 @@ def mixed_pixels(points: Points, distance: np.ndarray, factor: float) -> tuple[n
     """
     n, (third, second, first), neighbours = len(points), points.spread.T, points.neighbours
     mean = distance / np.sqrt(points.weight.take(neighbours).mean(axis=1))
-    flat = (third < FILLED_THIRD * second) & (second > FILLED_SECOND * first)
-    none, few = np.zeros(n, bool), max(MIXED_SHARE * n, 2 * neighbours.shape[1])
+    flat = (third < OUTLIER.filled_third * second) & (second > OUTLIER.filled_second * first)
+    none, few = np.zeros(n, bool), max(OUTLIER.mixed_share * n, 2 * neighbours.shape[1])
     thick = mean * np.sqrt(np.sqrt(third / np.maximum(second, TINY)))
     densest = np.where(flat, mean, np.inf)
     if np.count_nonzero(thick > factor * densest.min()) <= few:  # as in most clouds
         return none, False
     each = np.ascontiguousarray(neighbours.T)
-    for _ in range(DENSEST_HOPS + 1):
+    for _ in range(OUTLIER.hops + 1):
         densest = densest.take(each).min(axis=0)
     if np.count_nonzero(thick > factor * densest) <= few:
         return none, False
     found = thick > np.sqrt(factor) * densest
     surface, sparse = np.count_nonzero(flat) / n, np.count_nonzero(found) / n
-    clear = surface >= 2 * FLOATING_SHARE and sparse < FLOATING_SHARE
+    clear = surface >= 2 * OUTLIER.floating_share and sparse < OUTLIER.floating_share
     return (found if clear else none), not clear
 
 
@@ -144,20 +155,20 @@ def in_floating_cluster(points: np.ndarray, weight: np.ndarray, mean: np.ndarray
     island; and together they fill space, or are a handful alone. A sparse surface is flat, and a sparse limb long.
     """
     densest, each = row_medians(mean.take(neighbours)), np.ascontiguousarray(neighbours.T)
-    for _ in range(DENSEST_HOPS):
+    for _ in range(OUTLIER.hops):
         densest = densest.take(each).min(axis=0)
-    island, sparse = np.zeros(len(points), bool), mean > FLOATING_RATIO * np.median(mean)
+    island, sparse = np.zeros(len(points), bool), mean > OUTLIER.floating_ratio * np.median(mean)
     if sparse.any():
         near = neighbours[:, 1:5]
         ends = np.column_stack([np.repeat(np.arange(len(points)), near.shape[1]), near.ravel()])
         part = component_labels(len(points), ends)
-        island = np.bincount(part, weight)[part] < FLOATING_SHARE * weight.sum()
-    far = np.flatnonzero((mean > FLOATING_RATIO * densest) | (island & sparse))
+        island = np.bincount(part, weight)[part] < OUTLIER.floating_share * weight.sum()
+    far = np.flatnonzero((mean > OUTLIER.floating_ratio * densest) | (island & sparse))
     found = np.zeros(len(points), bool)
     if len(far) > 3:
-        among = nearest_neighbours(points[far], min(LIMB_NEIGHBOURS, len(far)))[1]
+        among = nearest_neighbours(points[far], min(OUTLIER.limb_neighbours, len(far)))[1]
         third, second, first = principal(points[far], among)[0].T
-        found[far] = (second > FILLED_SECOND * first) & (third > FILLED_THIRD * first)
+        found[far] = (second > OUTLIER.filled_second * first) & (third > OUTLIER.filled_third * first)
     if island.any():
-        found |= island & sparse & (np.bincount(part)[part] < LIMB_NEIGHBOURS)
-    return found & (weight[found].sum() < FLOATING_SHARE * weight.sum())
+        found |= island & sparse & (np.bincount(part)[part] < OUTLIER.limb_neighbours)
+    return found & (weight[found].sum() < OUTLIER.floating_share * weight.sum())

@@ -15,7 +15,7 @@ from ..curve.shape.junctions import move_junctions
 from ..curve.shape.wide_ends import level_wide_ends
 from ..curve.surface import Surface
 from ..curve.thin.deferred import Deferred
-from ..curve.thin.detect import LEAST_SURFACE, without_detached_clumps
+from ..curve.thin.detect import THIN, without_detached_clumps
 from ..curve.topology.false_branches import FalseBranches
 from ..curve.topology.gaps import Gaps
 from ..curve.topology.loops import Loops
@@ -160,7 +160,7 @@ class Refiner(Filter[Skeleton, Skeleton]):
 
     def _without_deferred(self, curve: Curve, surface: Surface) -> tuple[Curve, Surface, Deferred | None]:
         """The curve without parts that are left to a Tracer, and the surface around it."""
-        deferred = Deferred.of(curve, LEAST_SURFACE) if self.set_aside and self.handle else None
+        deferred = Deferred.of(curve, THIN.least_surface) if self.set_aside and self.handle else None
         if not deferred:
             return curve, surface, None
         curve = deferred.rest()

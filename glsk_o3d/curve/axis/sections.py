@@ -63,8 +63,6 @@ class VertexPoints:
         return Members(self.vertex, len(self.graph.vertices))
 
 
-# fitted: radii that a tangent plane passes by the sphere or section that it should touch, where its point counts half
-SURFACE_FIT = 0.25
 LEAST_SHARE = 1e-5  # precision: of the squared normals, above which they tell a direction: 1/300 of a radian
 
 

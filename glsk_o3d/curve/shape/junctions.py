@@ -1,27 +1,38 @@
 """Move junctions to where limbs meet: their lines and the surface around say it, and not the contraction."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
+from ...geometry.numbers import derived, fitted, precision
 from ...geometry.polylines import arc_lengths, place_at, relative_distance
 from ...geometry.vectors import TINY, dot
-from ..axis.fit import FIT_STAY, axis_box
-from ..axis.sections import SURFACE_FIT
+from ..axis.fit import axis_box
 from ..curve import Curve
-from ..limbs import AXIS_LEAVES, AXIS_LENGTH, JunctionLimbs, Line
+from ..limbs import JunctionLimbs, Line
 from ..merging import merge_into
+from ..numbers import CURVE
 from .handles import Handles
 
-# All fitted, but for the steps.
-LINE_NOISE = 0.05  # radii that a line is off at its middle, on a straight limb
-LINE_STEP = 0.1  # derived: radii from one place on a limb to the next that is asked
-LINE_STEPS = 400  # derived: places at most
-SURFACE_WEIGHT = 12.0  # of the surface that fits a sphere, over that of a line that says exactly where it is
-MEETING_ROUNDS = 10  # precision: from then on hardly anything moves
+
+@dataclass(frozen=True)
+class JunctionNumbers:
+    """Numbers of `move_junctions`."""
+
+    line_noise: float = fitted(0.05, "radii that a line is off at its middle, on a straight limb")
+    line_step: float = derived(0.1, "radii from one place on a limb to the next that is asked")
+    most_steps: int = derived(400, "places on a limb at most")
+    least_steps: int = precision(8, "places on a limb at least")
+    surface: float = fitted(12.0, "weight of the surface that fits a sphere, over that of a certain line")
+    rounds: int = precision(10, "rounds; from then on hardly anything moves")
+    radius_hold: float = precision(1e-6, "weight of the sphere's radius before, where no surface says it")
+
+
+JUNCTION = JunctionNumbers()
 
 
 class _Place(NamedTuple):
@@ -179,7 +190,7 @@ def _through_air(curve: Curve, places: dict[int, _Place]) -> np.ndarray:
     ends = np.array([(it.place, line.lead[:2][-1]) for it in places.values() for line in it.lines]).reshape(-1, 2, 3)
     thickest = [max(line.radius for line in it.lines) for it in places.values() for _ in it.lines]
     away = cKDTree(curve.points[curve.vertex_of_point >= 0]).query(ends.mean(axis=1))[0]
-    return ends[np.isfinite(away) & (away > AXIS_LENGTH * np.array(thickest))]
+    return ends[np.isfinite(away) & (away > CURVE.line_length * np.array(thickest))]
 
 
 def limb_line(
@@ -188,24 +199,24 @@ def limb_line(
     """The straight line through the part of a limb that is undisturbed by others, and nearest to its junction.
 
     Nothing is decided: every place counts by how far it has left the others, from 0 at their surface on, and less and
-    less from `AXIS_LENGTH` radii on. The half towards the limb's other end counts as undisturbed, whatever is there.
+    less from two radii on. The half towards the limb's other end counts as undisturbed, whatever is there.
     All paths are numbers of `vertices` (M, 3), the limb's from its junction on; the surface is `surface` (M,) away from
     these.
     """
     places = vertices[path]
     along = arc_lengths(places)
-    step = max(LINE_STEP * radius, along[-1] / LINE_STEPS, TINY)
-    n = max(int(np.ceil(along[-1] / step)), 8)
+    step = max(JUNCTION.line_step * radius, along[-1] / JUNCTION.most_steps, TINY)
+    n = max(int(np.ceil(along[-1] / step)), JUNCTION.least_steps)
     step, half = along[-1] / n, n // 2
     at = (np.arange(n) + 0.5) * step
     middles, clear = place_at(places, along, at), np.ones(n)
     if others:
         left, _ = relative_distance(middles, vertices, surface, others)
-        clear = np.clip((left - 1) / (2 * (AXIS_LEAVES - 1)), 0, 1)
+        clear = np.clip((left - 1) / (2 * (CURVE.undisturbed - 1)), 0, 1)
         clear[:half] = np.minimum.accumulate(clear[:half][::-1])[::-1]  # what left and came back had not left
     start = float((1 - clear[:half]).sum() * step)
     anchor = place_at(places, along, start)
-    weight = clear * np.clip(1.5 - np.cumsum(clear) * step / max(AXIS_LENGTH * radius, TINY), 0, 1)
+    weight = clear * np.clip(1.5 - np.cumsum(clear) * step / max(CURVE.line_length * radius, TINY), 0, 1)
     total = weight.sum()
     if total * step <= 0:
         return Line(anchor, np.zeros(3), 0.0, 0.0, start, anchor[None], radius)
@@ -237,12 +248,14 @@ def meet(
     place, touching, radius = near, radius, max(radius, TINY ** (1 / 3))  # its square is a divisor
     known = [line for line in lines if line.spread > 0 and line.radius > 0]
     middle, way = np.array([(line.middle, line.way) for line in known]).reshape(-1, 2, 3).transpose(1, 0, 2)
-    spread, noise = np.array([(line.spread, line.bend / line.radius + LINE_NOISE) for line in known]).reshape(-1, 2).T
+    spread, noise = (
+        np.array([(line.spread, line.bend / line.radius + JUNCTION.line_noise) for line in known]).reshape(-1, 2).T
+    )
     across = np.eye(3) - way[:, :, None] * way[:, None]
-    for _ in range(MEETING_ROUNDS):
-        matrix, right = np.diag([FIT_STAY] * 3 + [1e-6]), np.zeros(4)
-        right[:3] = FIT_STAY * (near - place)
-        right[3] = 1e-6 * touching
+    for _ in range(JUNCTION.rounds):
+        matrix, right = np.diag([CURVE.stay] * 3 + [JUNCTION.radius_hold]), np.zeros(4)
+        right[:3] = CURVE.stay * (near - place)
+        right[3] = JUNCTION.radius_hold * touching
         offset = middle - place
         ahead = dot(offset, way)
         aside, error = offset - ahead[:, None] * way, noise * (1 + (ahead / spread) ** 2)
@@ -253,8 +266,8 @@ def meet(
             offset = points - place
             window, height = np.exp(-dot(offset, offset) / (2 * radius**2)), dot(offset, normals)
             high = np.abs(height)
-            fits = window / (1 + ((high - touching) / (SURFACE_FIT * radius)) ** 2)
-            fits *= SURFACE_WEIGHT / max(window.sum(), SURFACE_WEIGHT * TINY)  # nothing near, no say
+            fits = window / (1 + ((high - touching) / (CURVE.touching * radius)) ** 2)
+            fits *= JUNCTION.surface / max(window.sum(), JUNCTION.surface * TINY)  # nothing near, no say
             # of n with the sign of its height, and 1
             matrix[:3, :3] += (fits[:, None] * normals).T @ normals
             matrix[3, :3] = matrix[:3, 3] = np.copysign(fits, height) @ normals
