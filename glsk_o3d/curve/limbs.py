@@ -95,11 +95,11 @@ class JunctionLimbs:
         was. Returned are, of each limb, its last undisturbed place (k, 3), where it passes the meeting place (k, 3), or
         again its last place if that is behind it, and whether it passes within the radius of the thickest (k,).
         """
-        anchor, way = (np.array(values) for values in zip(*map(self.axis, limbs), strict=True))
+        anchor, direction = (np.array(values) for values in zip(*map(self.axis, limbs), strict=True))
         radius = self.radius[[self.branch[limb] for limb in limbs]]
-        across = np.eye(3) - way[:, :, None] * way[:, None]
+        across = np.eye(3) - direction[:, :, None] * direction[:, None]
         weight = across.sum(axis=0) + CURVE.stay * np.eye(3)
         place = near + np.linalg.solve(weight, np.einsum("kij,kj->i", across, anchor - near))
-        along = dot(place - anchor, way)
-        fits = norm(place - anchor - along[:, None] * way) <= radius.max()
-        return anchor, anchor + np.maximum(along, 0)[:, None] * way, fits
+        along = dot(place - anchor, direction)
+        fits = norm(place - anchor - along[:, None] * direction) <= radius.max()
+        return anchor, anchor + np.maximum(along, 0)[:, None] * direction, fits

@@ -99,12 +99,12 @@ def to_ridges(points: Points, passes: int) -> Points:
     outlier = (local_outlier_ratio(mean_distance, neighbours) > DENOISER.outlier_ratio) & (points.noise > 0)
     if outlier.sum() > len(denoised) - max(k, MIN_POINTS):  # too few would be left
         outlier[:] = False
-    left, row = np.flatnonzero(~outlier), np.cumsum(~outlier) - 1
-    if len(left) < len(denoised):
-        row[outlier] = cKDTree(denoised[left]).query(denoised[outlier])[1]
-        denoised, neighbours = denoised[left], nearest_left(denoised, neighbours, ~outlier, k)
+    remaining, row = np.flatnonzero(~outlier), np.cumsum(~outlier) - 1
+    if len(remaining) < len(denoised):
+        row[outlier] = cKDTree(denoised[remaining]).query(denoised[outlier])[1]
+        denoised, neighbours = denoised[remaining], nearest_left(denoised, neighbours, ~outlier, k)
         points = replace(points, map=points.map.set_aside(outlier))
-    kept = {name: getattr(points, name)[left] for name in ("weight", "merged", "noise", "normals")}
+    kept = {name: getattr(points, name)[remaining] for name in ("weight", "merged", "noise", "normals")}
     return points.with_rows(row, denoised, neighbours, **kept)
 
 
@@ -152,13 +152,13 @@ def subspace_mean_shift(
         patch, mass = coordinates.take(around[part], axis=1), weight.take(around[part])
         step, x = noise[noisy[part]], coordinates[:, noisy[part]]
         for _ in range(passes):
-            apart = patch - x[:, :, None]
-            squared = (apart * apart).sum(axis=0)
+            offset = patch - x[:, :, None]
+            squared = (offset * offset).sum(axis=0)
             kernel = mass * np.exp(squared / (-2 * squared.mean(axis=1, keepdims=True)))
             kernel /= kernel.sum(axis=1, keepdims=True)
-            heavy = kernel * apart
+            heavy = kernel * offset
             shift = heavy.sum(axis=2)
-            spread = [np.einsum("nk,nk->n", heavy[i], apart[j]) - shift[i] * shift[j] for i, j in PAIRS]
+            spread = [np.einsum("nk,nk->n", heavy[i], offset[j]) - shift[i] * shift[j] for i, j in PAIRS]
             along = main_direction(np.stack(spread)).T
             shift -= (shift * along).sum(axis=0) * along
             x = x + step * shift

@@ -113,12 +113,12 @@ class LPRReducer(Filter[Contraction, Contraction]):
         rings = state.rings.replace(representatives, combined).take(np.flatnonzero(keep)).rename(index[representative])
         if self.mend_rings:
             rings = mend_rings(rings, state.cloud[survivors], state.normals[survivors])
-        left = {name: getattr(state, name)[keep] for name in OF_SURVIVORS}
+        of_survivors = {name: getattr(state, name)[keep] for name in OF_SURVIVORS}
         if self.conserve_mass:
-            left["mass"] = np.bincount(representative, state.mass, n)[keep]
-            _, left["ring_size0"] = rings.nearest(state.cloud[survivors])
-            _, left["ring_size"] = rings.nearest(left["positions"])
-        return state.merged_into(representative, rings=rings, **left)
+            of_survivors["mass"] = np.bincount(representative, state.mass, n)[keep]
+            _, of_survivors["ring_size0"] = rings.nearest(state.cloud[survivors])
+            _, of_survivors["ring_size"] = rings.nearest(of_survivors["positions"])
+        return state.merged_into(representative, rings=rings, **of_survivors)
 
 
 def merge_energy(state: Contraction) -> np.ndarray:
@@ -171,8 +171,8 @@ def match_feasible(state: Contraction, representatives: np.ndarray, swallowed: n
     rings, ring_of = Rings.concatenate([]), np.full(len(state), -1)
     feasible = np.ones(len(representatives), bool)
     while True:
-        left = np.flatnonzero(feasible)
-        chosen = left[match(len(state), representatives[left], swallowed[left])]
+        remaining = np.flatnonzero(feasible)
+        chosen = remaining[match(len(state), representatives[remaining], swallowed[remaining])]
         new = chosen[ring_of[representatives[chosen]] < 0]
         if len(new) == 0:
             return representatives[chosen], rings.take(ring_of[representatives[chosen]])
@@ -199,12 +199,14 @@ def match(n: int, representatives: np.ndarray, swallowed: np.ndarray) -> np.ndar
     # Rounds of the pairs that come before all others at both their points. Of nearest neighbours two or three do; only
     # a chain of pairs in its own order takes a round for every second one.
     pairs = np.stack([representatives, swallowed], axis=1)
-    free, first, left, chosen = np.ones(n, bool), np.empty(n, int), np.arange(len(pairs)), [np.empty(0, int)]
-    while len(left):
-        first[pairs[left[::-1]]] = left[::-1, None]  # of several writes the last one stays: that of the least position
-        ends = pairs[left]
-        wins = (first[ends] == left[:, None]).all(axis=1)
-        chosen.append(left[wins])
+    free, first, remaining, chosen = np.ones(n, bool), np.empty(n, int), np.arange(len(pairs)), [np.empty(0, int)]
+    while len(remaining):
+        first[pairs[remaining[::-1]]] = remaining[
+            ::-1, None
+        ]  # of several writes the last one stays: that of the least position
+        ends = pairs[remaining]
+        wins = (first[ends] == remaining[:, None]).all(axis=1)
+        chosen.append(remaining[wins])
         free[ends[wins]] = False
-        left = left[free[ends].all(axis=1)]
+        remaining = remaining[free[ends].all(axis=1)]
     return np.sort(np.concatenate(chosen))

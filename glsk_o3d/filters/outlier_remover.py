@@ -74,13 +74,13 @@ class OutlierRemover(Filter[Points, Points]):
         cloud, weight, neighbours, factor = points.cloud, points.weight, points.neighbours, self.outlier_factor
         distance = mean_distances(cloud, neighbours)
         mixed, doubtful = mixed_pixels(points, distance, factor)
-        left, neighbours = inliers(cloud, weight, neighbours, distance, mixed, factor, MIN_POINTS)
+        remaining, neighbours = inliers(cloud, weight, neighbours, distance, mixed, factor, MIN_POINTS)
         if doubtful:
             points = replace(points, report=points.report.with_warning(MIXED_OR_TWIGS))
-        if len(left) == len(points):
+        if len(remaining) == len(points):
             return points
         gone = np.ones(len(points), bool)
-        gone[left] = False
+        gone[remaining] = False
         rest = points.without(gone, neighbours)
         return replace(rest, report=replace(rest.report, n_mixed=int(mixed.sum())))
 
@@ -101,23 +101,23 @@ def inliers(
     At least `least` points are left. `mixed` pixels (n,) go in the first round. Returned are the rows (m,) of those
     left, ascending, and their nearest neighbours among these, (m, k).
     """
-    left = np.arange(len(points))
+    remaining = np.arange(len(points))
     for _ in range(OUTLIER.rounds):  # what is left of a cluster stands out once the rest is gone
         # as near as the neighbours would be if all were there
-        mean = distance / np.sqrt(weight[left].take(neighbours).mean(axis=1))
-        found = (local_outlier_ratio(mean, neighbours) > factor) | mixed[left]
+        mean = distance / np.sqrt(weight[remaining].take(neighbours).mean(axis=1))
+        outlier = (local_outlier_ratio(mean, neighbours) > factor) | mixed[remaining]
         if mean.max() > OUTLIER.floating_ratio * mean.min():  # else none can float
-            found |= in_floating_cluster(points[left], weight[left], mean, neighbours)
-        keep = np.flatnonzero(~found)
-        if len(keep) == len(left) or len(keep) < least:
+            outlier |= in_floating_cluster(points[remaining], weight[remaining], mean, neighbours)
+        keep = np.flatnonzero(~outlier)
+        if len(keep) == len(remaining) or len(keep) < least:
             break
-        left, index = left[keep], np.cumsum(~found) - 1
-        k = min(neighbours.shape[1], len(left))
-        changed = np.flatnonzero(found[neighbours[keep]].any(axis=1))
-        distance, neighbours, there = distance[keep], index[neighbours[keep, :k]], points[left]
+        remaining, index = remaining[keep], np.cumsum(~outlier) - 1
+        k = min(neighbours.shape[1], len(remaining))
+        changed = np.flatnonzero(outlier[neighbours[keep]].any(axis=1))
+        distance, neighbours, there = distance[keep], index[neighbours[keep, :k]], points[remaining]
         near, neighbours[changed] = nearest_neighbours(there, k, of=there[changed])
         distance[changed] = near[:, 1:].mean(axis=1)
-    return left, neighbours
+    return remaining, neighbours
 
 
 def mixed_pixels(points: Points, distance: np.ndarray, factor: float) -> tuple[np.ndarray, bool]:
@@ -142,10 +142,10 @@ def mixed_pixels(points: Points, distance: np.ndarray, factor: float) -> tuple[n
         densest = densest.take(each).min(axis=0)
     if np.count_nonzero(thick > factor * densest) <= few:
         return none, False
-    found = thick > np.sqrt(factor) * densest
-    surface, sparse = np.count_nonzero(flat) / n, np.count_nonzero(found) / n
+    mixed = thick > np.sqrt(factor) * densest
+    surface, sparse = np.count_nonzero(flat) / n, np.count_nonzero(mixed) / n
     clear = surface >= 2 * OUTLIER.floating_share and sparse < OUTLIER.floating_share
-    return (found if clear else none), not clear
+    return (mixed if clear else none), not clear
 
 
 def in_floating_cluster(points: np.ndarray, weight: np.ndarray, mean: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
@@ -164,11 +164,11 @@ def in_floating_cluster(points: np.ndarray, weight: np.ndarray, mean: np.ndarray
         part = component_labels(len(points), ends)
         island = np.bincount(part, weight)[part] < OUTLIER.floating_share * weight.sum()
     far = np.flatnonzero((mean > OUTLIER.floating_ratio * densest) | (island & sparse))
-    found = np.zeros(len(points), bool)
+    floating = np.zeros(len(points), bool)
     if len(far) > 3:
         among = nearest_neighbours(points[far], min(OUTLIER.limb_neighbours, len(far)))[1]
         third, second, first = principal(points[far], among)[0].T
-        found[far] = (second > OUTLIER.filled_second * first) & (third > OUTLIER.filled_third * first)
+        floating[far] = (second > OUTLIER.filled_second * first) & (third > OUTLIER.filled_third * first)
     if island.any():
-        found |= island & sparse & (np.bincount(part)[part] < OUTLIER.limb_neighbours)
-    return found & (weight[found].sum() < OUTLIER.floating_share * weight.sum())
+        floating |= island & sparse & (np.bincount(part)[part] < OUTLIER.limb_neighbours)
+    return floating & (weight[floating].sum() < OUTLIER.floating_share * weight.sum())

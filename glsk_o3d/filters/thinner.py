@@ -73,13 +73,13 @@ class Thinner(Filter[Points, Points]):
             return points
         before = np.inf
         while self.around and POINTS.enough <= len(points) <= before / 2:
-            before, here = len(points), points.cloud[points.survivors]
-            apart = spacing_enough(here, points.neighbours, points.spread, self.around)
-            points = _merged(points, thin_nearer(here, points.neighbours, apart))
+            before, places = len(points), points.cloud[points.survivors]
+            spacing = spacing_enough(places, points.neighbours, points.spread, self.around)
+            points = _merged(points, thin_nearer(places, points.neighbours, spacing))
         report = points.report
         if report.is_sampled and self.thin_to != "auto" and self.thin_to > report.n_sampled:
-            told = f"Thinner.thin_to = {self.thin_to}: the Sampler left {report.n_sampled} points: set Sampler.size"
-            points = replace(points, report=report.with_warning(told))
+            warning = f"Thinner.thin_to = {self.thin_to}: the Sampler left {report.n_sampled} points: set Sampler.size"
+            points = replace(points, report=report.with_warning(warning))
         n = max(report.n_input - report.n_dropped, report.n_by_area)
         most = default_size(n) if self.thin_to == "auto" else self.thin_to
         if most < len(points):
@@ -114,11 +114,11 @@ def thin(points: np.ndarray, neighbours: np.ndarray, n: int) -> np.ndarray:
         return kept[nearest], swallowed[nearest]
 
     representative = merge_pairs(points, neighbours, choose, least=max(n, THINNER.ask_again * len(points)))
-    left = representative == np.arange(len(points))
-    rows = np.flatnonzero(left)
+    remaining = representative == np.arange(len(points))
+    rows = np.flatnonzero(remaining)
     if n < len(rows) < len(points):
-        around = nearest_left(points, neighbours, left, min(neighbours.shape[1], len(rows)))
-        representative = rows[thin(points[rows], around, n)][(np.cumsum(left) - 1)[representative]]
+        around = nearest_left(points, neighbours, remaining, min(neighbours.shape[1], len(rows)))
+        representative = rows[thin(points[rows], around, n)][(np.cumsum(remaining) - 1)[representative]]
     return representative
 
 

@@ -128,8 +128,8 @@ def fit_axis(curve: Curve, passes: int, surface: Surface | None = None, settle: 
         radii = robust_radii(equal, norm(near.offset), near.doubt, n, vertex)
     doubt = np.minimum(near.doubt, _flat_doubt(near, spacing)) if passes and settle else near.doubt
     confidence = (1 - doubt) * near.support / (near.support + CURVE.half_support)
-    made = dict(vertices=x + centre, confidence=confidence, radii=radii, vertex_of_point=owner)
-    return curve.changed(**made, half_width=near.width, half_thickness=near.sections.half_thickness)
+    fields = dict(vertices=x + centre, confidence=confidence, radii=radii, vertex_of_point=owner)
+    return curve.changed(**fields, half_width=near.width, half_thickness=near.sections.half_thickness)
 
 
 def _walked(
@@ -200,10 +200,10 @@ def _nearest(
     share, tangent = np.column_stack([1 - t, t]), unit(x[ends[:, 1]] - x[ends[:, 0]])
     along = tangent.take(edge, axis=0)
     across, offset = cross(n, along), places_on_edges(x, ends, edge, t) - p
-    miss, apart = dot(across, offset) ** 2, dot(offset, offset) - dot(offset, along) ** 2
+    miss, distance = dot(across, offset) ** 2, dot(offset, offset) - dot(offset, along) ** 2
     a, b = ends.T
     aside = offset - dot(offset, along)[:, None] * along
-    facts = [miss, apart, np.full(len(p), 0.5), normal_moments(n, offset), aside[:, ROWS] * aside[:, COLUMNS]]
+    facts = [miss, distance, np.full(len(p), 0.5), normal_moments(n, offset), aside[:, ROWS] * aside[:, COLUMNS]]
     if sides:
         inward = dot(n, offset)[:, None]
         facts += [-np.sign(inward) * n, -inward * n, inward**2 * facts[3][:, :6]]
@@ -249,8 +249,8 @@ def _middle(near: _Nearest) -> tuple[np.ndarray, np.ndarray]:
         flat *= np.clip(2 - squares / np.maximum(np.maximum(half**2 * normals, squares / 2), TINY), 0, 1) ** 2
     seen = sums[0, 0]
     firm = flat * np.maximum(seen - np.abs(odd), 0)
-    way = flat * seen * (distant - width * odd) / np.maximum(seen + np.abs(odd), TINY)
-    return firm, np.clip(way, -firm * width, firm * width)
+    offset = flat * seen * (distant - width * odd) / np.maximum(seen + np.abs(odd), TINY)
+    return firm, np.clip(offset, -firm * width, firm * width)
 
 
 def _sides_and_faces(near: _Nearest) -> np.ndarray:
@@ -323,9 +323,9 @@ def _solve(x: np.ndarray, near: _Nearest, p: np.ndarray, pattern: _Pattern, sett
     ] * along
     right = right + np.einsum("nij,nj->ni", stay, x)
     if settle:
-        (firm, way), across = _middle(near), near.sections.across
+        (firm, offset), across = _middle(near), near.sections.across
         stay = stay + FIT.sides * firm[:, None, None] * across[:, :, None] * across[:, None]
-        right = right + FIT.sides * (firm * dot(across, x) + way)[:, None] * across
+        right = right + FIT.sides * (firm * dot(across, x) + offset)[:, None] * across
 
     reach = np.linalg.norm(x[beside] - x[inner, None], axis=2)
     chord = reach[:, ::-1] / np.maximum(reach.sum(axis=1, keepdims=True), TINY)

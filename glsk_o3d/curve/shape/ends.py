@@ -66,7 +66,7 @@ def regrow_ends(curve: Curve, to_surface: bool = False) -> Curve:
     """
     if not len(curve.leaves):
         return curve
-    grown = [found for end in _ends(curve) if (found := _grow(curve, *end, to_surface))]
+    grown = [end_grown for end in _ends(curve) if (end_grown := _grow(curve, *end, to_surface))]
     return _replanted(curve, grown) if grown else curve
 
 
@@ -105,33 +105,33 @@ def _grow(curve: Curve, path: np.ndarray, first: int, other: bool, to_surface: b
     along = arc_lengths(places)
     last = _last(cloud, path, along, first, other)
     length = along[last]
-    run, cut, way = _within(along, length, END.size * quantile(radii)), len(path), np.zeros(3)
+    run, cut, direction = _within(along, length, END.size * quantile(radii)), len(path), np.zeros(3)
     late = (length - along <= half_widths) & (other | (along >= half_widths))
     late[last + 1 :] = True
     stop = np.clip(along[np.argmax(late)] if late.any() else length, length / 2, length)
     for _ in range(2):  # how far the points reach is seen along a run that is no part of the cap itself
         radius, wide = quantile(radii[run]), quantile(half_widths[run])
         start = max(stop - CURVE.line_length * radius, 0)
-        way, anchor = _way(places, along, start, stop), place_at(places, along, stop)
+        direction, anchor = _way(places, along, start, stop), place_at(places, along, stop)
         # the points of a junction are other limbs', too
         own = cloud.members.of(path[max(np.searchsorted(along, start), 0 if other else 1) :])
         if len(own) < END.points:
             return None
-        reach = quantile((cloud.points[own] - anchor) @ way, END.reach)
-        close = ((places - anchor) @ way > reach - END.cut * wide) | late
+        reach = quantile((cloud.points[own] - anchor) @ direction, END.reach)
+        close = ((places - anchor) @ direction > reach - END.cut * wide) | late
         close = np.flatnonzero(close & (along > start))
         cut = max(close[0] if len(close) else len(path), first)
         stop = along[cut - 1]
         run = _within(along, stop, END.size * radius)
     radius, anchor = quantile(radii[run]), places[cut - 1]
     if stop > radius / 2:  # of a stub there is no run: it goes on as it was
-        way = _way(places, along, max(stop - CURVE.line_length * radius, 0), stop)
+        direction = _way(places, along, max(stop - CURVE.line_length * radius, 0), stop)
     own = cloud.members.of(path[max(cut - 2, 0 if other else min(1, len(path) - 1)) :])
     points = cloud.points[own] - anchor
-    ahead = points @ way > 0
+    ahead = points @ direction > 0
     if ahead.sum() < END.points:
         return None
-    end = _End.of(points[ahead], cloud.normals[own[ahead]], way, radius)
+    end = _End.of(points[ahead], cloud.normals[own[ahead]], direction, radius)
     behind = _within(along, stop, END.size * radius)
     tip = end.tip(_Taper.of(along[behind] - stop, radii[behind], radius), to_surface)
     steps = np.diff(along[run])
@@ -165,8 +165,8 @@ def _within(along: np.ndarray, stop: float, length: float) -> np.ndarray:
 def _way(places: np.ndarray, along: np.ndarray, start: float, stop: float) -> np.ndarray:
     """Direction of a path from one length along it to another, (3,) float array, by least squares."""
     lengths = np.linspace(start, stop, END.direction_samples)
-    way: Floats = (lengths - lengths.mean()) @ place_at(places, along, lengths)
-    return way / max(np.linalg.norm(way), TINY)
+    direction: Floats = (lengths - lengths.mean()) @ place_at(places, along, lengths)
+    return direction / max(np.linalg.norm(direction), TINY)
 
 
 class _Taper(NamedTuple):
@@ -201,20 +201,20 @@ class _End(NamedTuple):
     along: np.ndarray  # (s,), and its length up to them
 
     @classmethod
-    def of(cls, points: np.ndarray, normals: np.ndarray, way: np.ndarray, radius: float) -> _End:
+    def of(cls, points: np.ndarray, normals: np.ndarray, direction: np.ndarray, radius: float) -> _End:
         """The curve through the origin in a direction that suits the points best."""
         turn = bend = np.zeros(3)
         for _ in range(END.rounds):  # the axis of the parabola is the limb behind: where this turns, so must the axis
-            way = unit((way + turn)[None])[0]
-            turn, bend = _turn_and_bend(points, normals, way, bend, radius)
-        step, way = points @ way, way + turn
+            direction = unit((direction + turn)[None])[0]
+            turn, bend = _turn_and_bend(points, normals, direction, bend, radius)
+        step, direction = points @ direction, direction + turn
         # the nearest place of the curve: one step of Newton from the one abreast, by a radius at most
-        slope = way + step[:, None] * bend
-        off = points - step[:, None] * way - (step**2 / 2)[:, None] * bend
+        slope = direction + step[:, None] * bend
+        off = points - step[:, None] * direction - (step**2 / 2)[:, None] * bend
         step = step + np.clip(dot(off, slope) / np.maximum(dot(slope, slope) - off @ bend, 0.5), -radius, radius)
         steps = np.linspace(0, max(2 * step.max(), TINY), END.curve_samples)
-        along = arc_lengths(np.stack([steps, steps**2 / 2], axis=1) @ np.stack([way, bend]))
-        return cls(points, normals, way, bend, np.interp(step, steps, along), steps, along)
+        along = arc_lengths(np.stack([steps, steps**2 / 2], axis=1) @ np.stack([direction, bend]))
+        return cls(points, normals, direction, bend, np.interp(step, steps, along), steps, along)
 
     def curve(self, length: np.ndarray) -> np.ndarray:
         """Places so far ahead, (k, 3) float array."""
@@ -294,18 +294,20 @@ class _End(NamedTuple):
 
 
 def _turn_and_bend(
-    points: np.ndarray, normals: np.ndarray, way: np.ndarray, bend: np.ndarray, radius: float
+    points: np.ndarray, normals: np.ndarray, direction: np.ndarray, bend: np.ndarray, radius: float
 ) -> np.ndarray:
     """How a limb from the origin in a direction turns aside there, and how it bends, (2, 3) float array."""
-    length, across = points @ way, cross(normals, way)
+    length, across = points @ direction, cross(normals, direction)
     powers, miss = np.stack([length, length**2 / 2], axis=1), dot(across, points)
-    left = miss - powers[:, 1] * (across @ bend)
-    weight = (length <= quantile(length, END.reach)) * radius**2 / (radius**2 + 4 * left**2 + TINY)
-    frame: Floats = plane_axes(way[None])[0].T
-    ask = (powers[:, :, None] * (across @ frame.T)[:, None]).reshape(-1, 4)
+    residual = miss - powers[:, 1] * (across @ bend)
+    weight = (length <= quantile(length, END.reach)) * radius**2 / (radius**2 + 4 * residual**2 + TINY)
+    frame: Floats = plane_axes(direction[None])[0].T
+    rows = (powers[:, :, None] * (across @ frame.T)[:, None]).reshape(-1, 4)
     stiff = END.bending / 2 * (weight @ powers**2).repeat(2)
-    found: Floats = np.linalg.solve((weight[:, None] * ask).T @ ask + np.diag(stiff + TINY), (weight * miss) @ ask)
-    return found.reshape(2, 2) @ frame
+    solution: Floats = np.linalg.solve(
+        (weight[:, None] * rows).T @ rows + np.diag(stiff + TINY), (weight * miss) @ rows
+    )
+    return solution.reshape(2, 2) @ frame
 
 
 def _replanted(curve: Curve, grown: list[_Grown]) -> Curve:
@@ -315,7 +317,7 @@ def _replanted(curve: Curve, grown: list[_Grown]) -> Curve:
     keep, owner = np.ones(m, bool), curve.vertex_of_point.copy()
     low, high = axis_box(curve.points[curve.supporting_points])
     edges, known = [curve.edges], {name: [getattr(curve, name)] for name in ("radii", "confidence")}
-    planted = [np.clip(found.places, low, high) for found in grown]
+    planted = [np.clip(end.places, low, high) for end in grown]
     for (path, cut, _, run), places in zip(grown, planted, strict=True):
         gone, names = path[cut:], m + np.arange(len(places))
         m += len(places)

@@ -55,7 +55,7 @@ class Handles:
 
         Such a body is the widest part of a branch, between two thin ones that are near each other.
         """
-        found: list[int] = []
+        middles: list[int] = []
         vertices, degree = self.curve.vertices, self.curve.degree
         for branch in self.curve.branches:
             if degree[branch[0]] == 2:  # a ring begins anywhere, but not in a body
@@ -68,15 +68,15 @@ class Handles:
             before, after = thin[thin < top], thin[thin > top]
             if not len(before) or not len(after):
                 continue
-            apart = np.linalg.norm(vertices[branch[after[0]]] - vertices[branch[before[-1]]])
+            distance = np.linalg.norm(vertices[branch[after[0]]] - vertices[branch[before[-1]]])
             body = branch[before[-1] + 1 : after[0]]
             own = self.cloud.members.of(body)
-            if apart > CURVE.stub * wide[top] or not len(own):
+            if distance > CURVE.stub * wide[top] or not len(own):
                 continue
             away = norm(vertices[body] - self.cloud.points[own].mean(axis=0))
             if away.min() < wide[top] / 2 and self.on_loop(branch):  # or the middle is that of a thick ring
-                found.append(body[away.argmin()])
-        return np.array(found, int)
+                middles.append(body[away.argmin()])
+        return np.array(middles, int)
 
     def body(self, paths: list[np.ndarray]) -> Body:
         """The body where some paths begin: as far along these as all vertices are at most their width away from there.
@@ -129,7 +129,7 @@ class Handles:
         for start in np.unique(np.minimum(away, last)):
             begin = int(np.searchsorted(along, start, "right")) - 1
             behind, ahead = min(begin + 2, len(path) - 1), max(begin - 2, 0)
-            found, way = self._followed(
+            centres, direction = self._followed(
                 float(np.linalg.norm(places[begin] - places[0])),
                 places[begin],
                 unit(places[[ahead]] - places[[behind]])[0],
@@ -137,17 +137,17 @@ class Handles:
                 half_thickness,
                 self._sections.across[path[begin]],
             )
-            inwards = body.middle - found[-1]
-            if len(found) > 1 and inwards @ np.linalg.solve(body.wall, inwards) < CURVE.undisturbed**2:
+            inwards = body.middle - centres[-1]
+            if len(centres) > 1 and inwards @ np.linalg.solve(body.wall, inwards) < CURVE.undisturbed**2:
                 # the wall disturbs what the handle says of its direction: the more it turns aside, the less that counts
-                straight = max(inwards @ way, 0.0)
+                straight = max(inwards @ direction, 0.0)
                 share = straight**2 / max(inwards @ inwards, TINY)
-                way = unit(((1 - share) * inwards + share * straight * way)[None])[0]
-                return Line(found[-1], way, radius, 0.0, float(along[begin]), found[::-1], radius)
+                direction = unit(((1 - share) * inwards + share * straight * direction)[None])[0]
+                return Line(centres[-1], direction, radius, 0.0, float(along[begin]), centres[::-1], radius)
         return None
 
     def _followed(
-        self, far: float, place: Floats, way: Floats, half_width: float, half_thickness: float, across: Floats
+        self, far: float, place: Floats, direction: Floats, half_width: float, half_thickness: float, across: Floats
     ) -> tuple[Floats, Floats]:
         """Follow a handle from a place, at most so far, while its sections close around it.
 
@@ -157,9 +157,9 @@ class Handles:
         tangent plane touches an ellipse with the half axes of the handle, so that the wall of the body hardly does.
         """
         radius = max(np.sqrt(half_width * half_thickness), TINY)
-        found = [place]
+        centres = [place]
         for _ in range(int(far / (HANDLE.step * radius))):
-            centre, turned = found[-1] + HANDLE.step * radius * way, way
+            centre, turned = centres[-1] + HANDLE.step * radius * direction, direction
             near = self._tree.query_ball_point(centre, np.hypot(radius, CURVE.undisturbed * half_width))
             points, normals = self.cloud.points[near], self.cloud.normals[near]
             for fits in range(HANDLE.rounds + 1):
@@ -185,8 +185,8 @@ class Handles:
             outward = np.linalg.norm(np.copysign(weight, height) @ normals)
             if np.count_nonzero(weight) < HANDLE.points or outward > HANDLE.open * weight.sum():
                 break
-            found.append(centre)
-            way = turned
+            centres.append(centre)
+            direction = turned
             across = half_axes((weight @ normal_moments(normals, offset))[None], np.array([radius])).across[0]
         # half a ring hardly says where it leads: the last places do
-        return np.array(found), unit((found[-1] - found[max(len(found) - 3, 0)])[None])[0]
+        return np.array(centres), unit((centres[-1] - centres[max(len(centres) - 3, 0)])[None])[0]

@@ -80,20 +80,20 @@ def _places(
     """Where every junction belongs, if that is not known of the same limbs from before others were merged."""
     cloud = handles.cloud if handles else curve.cloud
     low, high = axis_box(cloud.points if len(cloud.points) else curve.vertices)
-    found = {}
+    places = {}
     for junction in sorted(limbs.at):
-        name, here = limbs.signature(junction), limbs.at[junction]
-        paths = [limbs.paths[limb] for limb in here]
+        name, limbs_here = limbs.signature(junction), limbs.at[junction]
+        paths = [limbs.paths[limb] for limb in limbs_here]
         body = handles.body(paths) if handles and any(map(handles.on_loop, paths)) else None
         follows = [handles.follow(path, body) if handles and body else None for path in paths]
         followed = sum(line is not None for line in follows)
         if name in known and not followed:
-            found[junction] = known[name]
+            places[junction] = known[name]
             continue
         lines, radius, around = [], 0.0, []
-        for limb, path, line in zip(here, paths, follows, strict=True):
+        for limb, path, line in zip(limbs_here, paths, follows, strict=True):
             along = arc_lengths(limbs.vertices[path])
-            others = [limbs.paths[k] for k in here if limbs.branch[k] != limbs.branch[limb]]
+            others = [limbs.paths[k] for k in limbs_here if limbs.branch[k] != limbs.branch[limb]]
             radius_of = limbs.radius[limbs.branch[limb]]
             line = line or limb_line(limbs.vertices, limbs.surface, path, radius_of, others)
             lines.append(line)
@@ -112,8 +112,8 @@ def _places(
                 wall = line.lead[:1]
                 way_in = wall + max((place - wall[0]) @ line.way, 0) * line.way
                 lines[k] = line._replace(lead=np.concatenate([way_in, line.lead]))
-        known[name] = found[junction] = _Place(place, touching, lines)
-    return found
+        known[name] = places[junction] = _Place(place, touching, lines)
+    return places
 
 
 def _merged(curve: Curve, limbs: JunctionLimbs, places: dict[int, _Place]) -> Curve | None:
@@ -122,10 +122,10 @@ def _merged(curve: Curve, limbs: JunctionLimbs, places: dict[int, _Place]) -> Cu
     near: dict[int, tuple[float, int]] = {}
     for k in np.flatnonzero(limbs.inner).tolist():
         (a, b) = (places[v] for v in ends[k])
-        apart = float(np.linalg.norm(a.place - b.place)) / max(a.radius, b.radius, TINY)
-        if apart < 1 and ends.count(ends[k]) == 1:
+        distance = float(np.linalg.norm(a.place - b.place)) / max(a.radius, b.radius, TINY)
+        if distance < 1 and ends.count(ends[k]) == 1:
             for v in ends[k]:
-                near[v] = min(near.get(v, (np.inf, k)), (apart, k))
+                near[v] = min(near.get(v, (np.inf, k)), (distance, k))
     pairs = [k for k in {k for _, k in near.values()} if all(near[v][1] == k for v in ends[k])]
     if not pairs:
         return None
@@ -211,8 +211,8 @@ def limb_line(
     at = (np.arange(n) + 0.5) * step
     middles, clear = place_at(places, along, at), np.ones(n)
     if others:
-        left, _ = relative_distance(middles, vertices, surface, others)
-        clear = np.clip((left - 1) / (2 * (CURVE.undisturbed - 1)), 0, 1)
+        ratio, _ = relative_distance(middles, vertices, surface, others)
+        clear = np.clip((ratio - 1) / (2 * (CURVE.undisturbed - 1)), 0, 1)
         clear[:half] = np.minimum.accumulate(clear[:half][::-1])[::-1]  # what left and came back had not left
     start = float((1 - clear[:half]).sum() * step)
     anchor = place_at(places, along, start)
@@ -222,11 +222,11 @@ def limb_line(
         return Line(anchor, np.zeros(3), 0.0, 0.0, start, anchor[None], radius)
     weight /= total
     middle, mean = weight @ middles, weight @ at
-    way = (weight * (mean - at)) @ (middles - middle)
-    way /= max(np.linalg.norm(way), TINY)
-    off = middles - middle - (mean - at)[:, None] * way
+    direction = (weight * (mean - at)) @ (middles - middle)
+    direction /= max(np.linalg.norm(direction), TINY)
+    off = middles - middle - (mean - at)[:, None] * direction
     spread, bend = np.sqrt(weight @ (at - mean) ** 2), np.sqrt(weight @ dot(off, off))
-    return Line(middle, way, float(spread), float(bend), start, anchor[None], radius)
+    return Line(middle, direction, float(spread), float(bend), start, anchor[None], radius)
 
 
 def meet(
@@ -247,18 +247,18 @@ def meet(
     """
     place, touching, radius = near, radius, max(radius, TINY ** (1 / 3))  # its square is a divisor
     known = [line for line in lines if line.spread > 0 and line.radius > 0]
-    middle, way = np.array([(line.middle, line.way) for line in known]).reshape(-1, 2, 3).transpose(1, 0, 2)
+    middle, direction = np.array([(line.middle, line.way) for line in known]).reshape(-1, 2, 3).transpose(1, 0, 2)
     spread, noise = (
         np.array([(line.spread, line.bend / line.radius + JUNCTION.line_noise) for line in known]).reshape(-1, 2).T
     )
-    across = np.eye(3) - way[:, :, None] * way[:, None]
+    across = np.eye(3) - direction[:, :, None] * direction[:, None]
     for _ in range(JUNCTION.rounds):
         matrix, right = np.diag([CURVE.stay] * 3 + [JUNCTION.radius_hold]), np.zeros(4)
         right[:3] = CURVE.stay * (near - place)
         right[3] = JUNCTION.radius_hold * touching
         offset = middle - place
-        ahead = dot(offset, way)
-        aside, error = offset - ahead[:, None] * way, noise * (1 + (ahead / spread) ** 2)
+        ahead = dot(offset, direction)
+        aside, error = offset - ahead[:, None] * direction, noise * (1 + (ahead / spread) ** 2)
         weight = 1 / ((1 + error**2) * (1 + dot(aside, aside) / radius**2))
         matrix[:3, :3] += (weight[:, None, None] * across).sum(axis=0)
         right[:3] += weight @ aside

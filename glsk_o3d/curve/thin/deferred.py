@@ -43,11 +43,11 @@ class Deferred(NamedTuple):
 
     def rest(self) -> Curve:
         """What is left, with its points alone."""
-        whole, left, rows = self.whole, ~self.gone, self.rows
-        number = np.cumsum(left) - 1
+        whole, stays, rows = self.whole, ~self.gone, self.rows
+        number = np.cumsum(stays) - 1
         return whole.changed(
-            **all_of_vertices(whole, left),
-            edges=number[whole.edges[left[whole.edges].all(axis=1)]],
+            **all_of_vertices(whole, stays),
+            edges=number[whole.edges[stays[whole.edges].all(axis=1)]],
             vertex_of_point=number[whole.vertex_of_point[rows]],
             points=whole.points[rows],
             normals=whole.normals[rows],

@@ -171,8 +171,8 @@ class _Paths:
         return path
 
     def _cover(self, path: np.ndarray | list[int]) -> None:
-        for found in self._tree.query_ball_point(self.centre[path], self._reach[path]):
-            self._covered[found] = True
+        for points in self._tree.query_ball_point(self.centre[path], self._reach[path]):
+            self._covered[points] = True
 
 
 def _assembled(curve: Curve, mixed: _Mixed, paths: _Paths, tree: bool) -> Curve:
@@ -210,11 +210,11 @@ def _meetings(vertices: np.ndarray, edges: np.ndarray, tips: np.ndarray, scale: 
     a, b = cKDTree(vertices[tips]).query_pairs(LINK_SPACINGS * scale, output_type="ndarray").T
     gap = vertices[tips[b]] - vertices[tips[a]]
     straight = np.minimum(dot(ahead[a], unit(gap)), -dot(ahead[b], unit(gap)))
-    found: list[int] = []
+    matched: list[int] = []
     for k in np.argsort(norm(gap)).tolist():
-        if straight[k] > TRACE.meeting and not {a[k], b[k]} & set(found):
-            found += [a[k], b[k]]
-    return tips[found].reshape(-1, 2)
+        if straight[k] > TRACE.meeting and not {a[k], b[k]} & set(matched):
+            matched += [a[k], b[k]]
+    return tips[matched].reshape(-1, 2)
 
 
 def spread_around(curve: Curve) -> np.ndarray:
@@ -283,9 +283,9 @@ def drop_spurious(curve: Curve, traced: np.ndarray, radii: float, root: int | No
             return curve, stays
         group, gone = np.arange(len(traced)), np.isin(twig, chosen)
         group[body[gone]] = forks[twig[gone]]
-        left = np.unique(group)
-        root = None if root is None else int(np.searchsorted(left, root))
-        curve, traced, stays = merge_into(curve, group), traced[left], stays[left]
+        remaining = np.unique(group)
+        root = None if root is None else int(np.searchsorted(remaining, root))
+        curve, traced, stays = merge_into(curve, group), traced[remaining], stays[remaining]
         curve = curve.changed(radii=np.where(traced, spread_around(curve), curve.radii))
 
 
@@ -293,5 +293,5 @@ def _twigs(curve: Curve, traced: np.ndarray, root: int | None) -> list[np.ndarra
     """Traced branches that end, as paths from the junctions that they leave, by their tips."""
     degree, free = curve.degree, traced & (np.arange(len(traced)) != (-1 if root is None else root))
     paths = [branch[::-1] if degree[branch[0]] == 1 else branch for branch in curve.branches]
-    found = [path for path in paths if degree[path[0]] > 2 and degree[path[-1]] == 1 and free[path[1:]].all()]
-    return sorted(found, key=lambda path: int(path[-1]))
+    twigs = [path for path in paths if degree[path[0]] > 2 and degree[path[-1]] == 1 and free[path[1:]].all()]
+    return sorted(twigs, key=lambda path: int(path[-1]))

@@ -139,11 +139,11 @@ def _sides(branch: np.ndarray, around: list[list[tuple[int, float]]], m: int) ->
     """
     inner, sides = set(branch[1:-1].tolist()), []
     for start, stop in ((int(branch[0]), int(branch[-1])), (int(branch[-1]), int(branch[0]))):
-        found, front = {start}, [start]
+        reached, front = {start}, [start]
         for _ in range(CROSSING_HOPS):
-            front = [v for u in front for v, _ in around[u] if v not in found and v not in inner and v != stop]
-            found.update(front)
-        sides.append(found)
+            front = [v for u in front for v, _ in around[u] if v not in reached and v not in inner and v != stop]
+            reached.update(front)
+        sides.append(reached)
     place = positions(branch, m)
     place[list(sides[0] - sides[1])] = 0
     place[list(sides[1] - sides[0])] = len(branch) - 1
@@ -155,31 +155,31 @@ def _straightness(
 ) -> float:
     """Cosine between an edge of a branch and how the curve goes on beyond, at the better of both ends."""
     low, high = branch[max(k - 1, 0)], branch[min(k + 2, len(branch) - 1)]
-    way = vertices[high] - vertices[low]
-    way = way / max(np.linalg.norm(way), TINY)
+    direction = vertices[high] - vertices[low]
+    direction = direction / max(np.linalg.norm(direction), TINY)
     best = []
-    for here, came, sign in ((int(branch[k + 1]), int(branch[k]), 1), (int(branch[k]), int(branch[k + 1]), -1)):
-        ways = _beyond(vertices, around, here, came, CURVE.heading * radius)
-        best.append(max((sign * float(way @ onward) for onward in ways), default=1.0))
+    for vertex, previous, sign in ((int(branch[k + 1]), int(branch[k]), 1), (int(branch[k]), int(branch[k + 1]), -1)):
+        onwards = _beyond(vertices, around, vertex, previous, CURVE.heading * radius)
+        best.append(max((sign * float(direction @ onward) for onward in onwards), default=1.0))
     return max(best)
 
 
 def _beyond(
-    vertices: np.ndarray, around: list[list[tuple[int, float]]], start: int, came: int, reach: float
+    vertices: np.ndarray, around: list[list[tuple[int, float]]], start: int, previous: int, reach: float
 ) -> list[np.ndarray]:
     """Directions in which a graph goes on from a vertex, along all its shortest ways: over their last two thirds."""
-    before: dict[int, int] = {came: -1}
+    before: dict[int, int] = {previous: -1}
     travelled: dict[int, float] = {}
     heap = [(0.0, start, -1)]
     while heap:
-        far, here, origin = heappop(heap)
-        if here in before:
+        far, vertex, origin = heappop(heap)
+        if vertex in before:
             continue
-        before[here], travelled[here] = origin, far
+        before[vertex], travelled[vertex] = origin, far
         if far < reach:
-            for onward, length in around[here]:
-                heappush(heap, (far + length, onward, here))
-    found = []
+            for onward, length in around[vertex]:
+                heappush(heap, (far + length, onward, vertex))
+    directions = []
     for tip in travelled.keys() - before.values() - {start}:
         path = [tip]
         while path[-1] != start:
@@ -187,5 +187,5 @@ def _beyond(
         along, places = np.array([travelled[v] for v in reversed(path)]), vertices[path[::-1]]
         stop = min(along[-1], reach)
         first, last = place_at(places, along, stop / 3), place_at(places, along, stop)
-        found.append((last - first) / max(float(np.linalg.norm(last - first)), TINY))
-    return found
+        directions.append((last - first) / max(float(np.linalg.norm(last - first)), TINY))
+    return directions

@@ -86,13 +86,13 @@ def gap_facts(evidence: Evidence) -> Iterator[tuple[tuple[int, int], dict[str, f
         return  # parts too thin to have an inside, which could go on across a gap
     leaves = [end.leaf for end in ends]
     along = dijkstra(linked(curve.vertices, curve.edges), indices=leaves)
-    found = [(end, other) for i, end in enumerate(ends) for other in _aims(curve, end, along[i], leaves, along)]
-    if not found:
+    bridges = [(end, other) for i, end in enumerate(ends) for other in _aims(curve, end, along[i], leaves, along)]
+    if not bridges:
         return
-    across = [curve.vertices[other] - end.place for end, other in found]
-    samples = [end.place + BRIDGE_SAMPLES * way for (end, *_), way in zip(found, across, strict=True)]
-    winding = surface.winding(np.concatenate(samples)).reshape(len(found), -1).min(axis=1) / typical
-    for (end, other), least in zip(found, winding, strict=True):
+    across = [curve.vertices[other] - end.place for end, other in bridges]
+    samples = [end.place + BRIDGE_SAMPLES * way for (end, *_), way in zip(bridges, across, strict=True)]
+    winding = surface.winding(np.concatenate(samples)).reshape(len(bridges), -1).min(axis=1) / typical
+    for (end, other), least in zip(bridges, winding, strict=True):
         facts = dict(
             winding=float(np.clip(least, GAP.least_winding, GAP.most_winding)),
             cap=float(np.log(_cap(end, surface) + GAP.least_cap)),
@@ -113,9 +113,9 @@ def _aims(curve: Curve, end: _End, travelled: np.ndarray, leaves: list[int], alo
     # what the way by an end leads to is behind it, and not asked for itself
     behind = ((away[leaves][:, None] + along)[aims[leaves]] < GAP.detour * away).any(axis=0)
     for kind in (free, ~free & ~behind):
-        some = np.flatnonzero(aims & kind)
-        if len(some):
-            yield int(some[np.argmin(cost[some])])
+        rows = np.flatnonzero(aims & kind)
+        if len(rows):
+            yield int(rows[np.argmin(cost[rows])])
 
 
 def _cap(end: _End, surface: Surface) -> float:
@@ -137,5 +137,5 @@ def _ends(curve: Curve) -> Iterator[_End]:
             if curve.degree[path[0]] == 1 and radius > 0:
                 places = curve.vertices[path]
                 back = int(np.searchsorted(arc_lengths(places)[1:], CURVE.heading * radius)) + 1
-                way = places[0] - places[min(back, len(path) - 1)]
-                yield _End(int(path[0]), places[0], way / max(np.linalg.norm(way), TINY), radius)
+                direction = places[0] - places[min(back, len(path) - 1)]
+                yield _End(int(path[0]), places[0], direction / max(np.linalg.norm(direction), TINY), radius)

@@ -207,16 +207,18 @@ class _View:
 
     def walls(self, place: int) -> float:
         """How far the nearest points all around a place face it: the mean cosine, of no points 0."""
-        way = self._points - self._places[place]
-        distance = np.hypot(*way.T)
-        sector = (LOOP.sectors * (np.arctan2(way[:, 1], way[:, 0]) / (2 * np.pi) + 0.5)).astype(int) % LOOP.sectors
+        offset = self._points - self._places[place]
+        distance = np.hypot(*offset.T)
+        sector = (LOOP.sectors * (np.arctan2(offset[:, 1], offset[:, 0]) / (2 * np.pi) + 0.5)).astype(
+            int
+        ) % LOOP.sectors
         order = np.lexsort([distance, sector])
         nearest = order[np.unique(sector[order], return_index=True)[1]]
         clear = self._clear[place]
         if clear < np.inf and (len(nearest) < LOOP.sectors or distance[nearest].max() >= clear):
             self._see()
             return self.walls(place)
-        cosine = np.abs((self._normals[nearest] * way[nearest]).sum(axis=1)) / np.maximum(distance[nearest], TINY)
+        cosine = np.abs((self._normals[nearest] * offset[nearest]).sum(axis=1)) / np.maximum(distance[nearest], TINY)
         return float(cosine.sum() / LOOP.sectors)
 
 
