@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from glsk_o3d import InvalidCloudError, Skeleton, Tracer, pipelines, samples
+from glsk_o3d.curve.limbs import Line
 from glsk_o3d.curve.shape.junctions import meet
-from glsk_o3d.curve.topology.limbs import Line
 from glsk_o3d.filters import refiner
+from glsk_o3d.pipeline import RunContext
 
 pytestmark = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
 UNKNOWN = {"normals": "points without one", "support": "not measured", "points": "checked where they come in"}
@@ -67,7 +68,7 @@ def run(cloud, stages):
     data = cloud
     try:
         for stage in stages:
-            data = stage.run(data, None)
+            data = stage.run(data, RunContext())
             check_finite(data, type(stage).__name__)
     except InvalidCloudError:  # of too few places
         return None
@@ -90,8 +91,7 @@ def watched(monkeypatch):
 
     for name in STEPS:
         monkeypatch.setattr(refiner, name, looked_at(name, getattr(refiner, name)))
-    for about, step in refiner.ANSWERS.items():
-        monkeypatch.setitem(refiner.ANSWERS, about, looked_at(about, step))
+    monkeypatch.setattr(refiner, "ask", looked_at("ask", refiner.ask))
     with np.errstate(divide="raise", over="raise", invalid="raise"):
         yield
 
@@ -108,7 +108,7 @@ def test_numbers_of_degenerate_clouds_are_finite(watched, how):
         done += isinstance(skeleton, Skeleton)
         if skeleton is not None:
             assert (skeleton.radii >= 0).all()
-            check_finite(Tracer(root="z").run(skeleton, None), "Tracer")
+            check_finite(Tracer(root="z").run(skeleton, RunContext()), "Tracer")
     assert done >= 18
 
 

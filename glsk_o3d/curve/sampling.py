@@ -23,7 +23,9 @@ def surface_sample(curve: Curve) -> np.ndarray:
     """
     rows, m = curve.surface_points, len(curve.vertices)
     clean = 1 - curve.report.noise
-    if not len(rows) or len(rows) * clean <= REFINED_POINTS:
+    if not len(rows):  # all points that have a vertex
+        return np.flatnonzero(curve.vertex_of_point >= 0)
+    if len(rows) * clean <= REFINED_POINTS:
         return rows
     rows = rows[morton_order(curve.points[rows])]
     vertex = curve.vertex_of_point[rows]

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from glsk_o3d import Refiner, Skeleton, Tracer, pipelines, samples, skeletonize
-from glsk_o3d.curve.thin.deferred import Aside
+from glsk_o3d.curve.curve import Curve
+from glsk_o3d.curve.thin.deferred import Deferred
 
 pytestmark = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
 ALL = ("vertices", "radii", "confidence", "half_width", "half_thickness", "support")
@@ -33,7 +34,7 @@ def test_a_crown_is_set_aside_and_the_trunk_is_not(crown):
 
 
 def test_it_makes_no_difference_to_what_a_tree_is(crown, monkeypatch):
-    monkeypatch.setattr(Aside, "of", lambda *_: None)
+    monkeypatch.setattr(Deferred, "of", lambda *_: None)
     whole = skeletonize(crown[0].points)
     assert abs(len(whole.leaves) - len(crown[0].leaves)) < 5
     assert abs(whole.length / crown[0].length - 1) < 0.02
@@ -83,12 +84,12 @@ def grid(n):
 
 def test_what_is_mostly_on_loops_is_not_set_aside():
     net = grid(24)
-    assert Aside.of(net, 0.65) is None
-    assert Aside.of(comb(), 0.65).gone.all()
+    assert Deferred.of(Curve.of(net), 0.65) is None
+    assert Deferred.of(Curve.of(comb()), 0.65).gone.all()
 
 
 def test_small_skeletons_are_not_set_aside():
-    assert Aside.of(comb(12), 0.65) is None
+    assert Deferred.of(Curve.of(comb(12)), 0.65) is None
 
 
 def comb(n=24, more=()):
@@ -100,13 +101,13 @@ def comb(n=24, more=()):
 
 def seen(monkeypatch):
     """What is set aside from now on."""
-    found, look = [], Aside.of
+    found, look = [], Deferred.of
 
     def watch(*args):
         found.append(look(*args))
         return found[-1]
 
-    monkeypatch.setattr(Aside, "of", watch)
+    monkeypatch.setattr(Deferred, "of", watch)
     return found
 
 
@@ -149,7 +150,7 @@ def test_of_what_is_left_nothing_may_be_asked(monkeypatch, recentre, edges):
 def test_points_without_a_vertex_have_none_afterwards():
     lines = comb()
     owner = np.where(np.arange(len(lines.points)) % 7, lines.vertex_of_point, -1)
-    aside = Aside.of(replace(lines, vertex_of_point=owner), 0.65)
+    aside = Deferred.of(Curve.of(replace(lines, vertex_of_point=owner)), 0.65)
     np.testing.assert_array_equal(aside.put_back(aside.rest()).vertex_of_point, owner)
 
 
@@ -170,12 +171,12 @@ def test_a_crown_does_not_hang_on_the_order_of_points(crown):
 
 
 def test_all_can_be_judged(monkeypatch):
-    monkeypatch.setattr(Aside, "of", lambda *_: pytest.fail("asked"))
+    monkeypatch.setattr(Deferred, "of", lambda *_: pytest.fail("asked"))
     assert len(Refiner(set_aside=False)(comb()).edges)
 
 
 def test_without_questions_nothing_is_set_aside(monkeypatch):
-    monkeypatch.setattr(Aside, "of", lambda *_: pytest.fail("asked"))
+    monkeypatch.setattr(Deferred, "of", lambda *_: pytest.fail("asked"))
     off = {f"Refiner.{option}": 0 for option in ("handle", "limb", "air", "bridge", "recentre")}
     skeleton = pipelines.default().with_options(off)(samples.tree(4096, forks=6).points)
     assert len(skeleton.edges)

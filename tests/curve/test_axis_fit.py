@@ -11,14 +11,14 @@ from scipy.spatial import cKDTree
 from glsk_o3d import Skeleton
 from glsk_o3d.curve.axis import fit as axis_fit
 from glsk_o3d.curve.axis.fit import HALF_SUPPORT
-from glsk_o3d.curve.axis.sections import measure_sections
+from glsk_o3d.curve.curve import Curve
 
 R = 0.15  # of the tubes
 
 
 def fit_axis(skeleton, passes, **options):
     """Vertices, confidence and radii after a fit."""
-    fitted = axis_fit.fit_axis(skeleton, passes, **options)
+    fitted = axis_fit.fit_axis(Curve.of(skeleton), passes, **options)
     return fitted.vertices, fitted.confidence, fitted.radii
 
 
@@ -186,8 +186,8 @@ def test_a_hoop_bends_where_it_is_thin():
 
 @pytest.mark.parametrize(("wide", "thick"), [(0.3, 0.06), (0.2, 0.1)])
 def test_the_section_of_a_flat_bar_is_its_own_and_its_width_is_doubt(wide, thick):
-    fitted = axis_fit.fit_axis(strip(wide, thick), 3)
-    sections = measure_sections(fitted)
+    fitted = axis_fit.fit_axis(Curve.of(strip(wide, thick)), 3)
+    sections = fitted.sections
     np.testing.assert_allclose(sections.half_width[4:-4], wide, rtol=0.02)
     np.testing.assert_allclose(sections.half_thickness[4:-4], thick, rtol=0.02)
     # mean squares over the section, of what the normals do not explain and of the distance
@@ -350,7 +350,7 @@ def test_detached_vertices_are_pulled_back_to_the_reach_of_half_a_tube(random_sk
     normals = raw.normals.copy()
     normals[::7] = np.nan
     raw = replace(raw, vertices=3 * raw.vertices, normals=normals)
-    skeleton = axis_fit.pull_back_detached(raw)
+    skeleton = axis_fit.pull_back_detached(Curve.of(raw))
     for v, (before, after) in enumerate(zip(raw.vertices, skeleton.vertices, strict=True)):
         own = raw.points[[p for p in raw.supporting_points if raw.vertex_of_point[p] == v]]
         if len(own) == 0:

@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton, samples, skeletonize
+from glsk_o3d.curve.curve import Curve
 from glsk_o3d.curve.shape.ends import regrow_ends
 
 R = 0.1
@@ -75,7 +76,7 @@ def test_an_end_bent_into_a_corner_where_others_have_the_points_is_straightened(
     owner[np.argsort(np.linalg.norm(points - aside[-1], axis=1))[:beside]] = m + k - 1
     radii = np.where(np.arange(m + k) < m, R, R / 20)
     bent = Skeleton(np.concatenate([straight.vertices, aside]), sorted(edges), radii, owner, points, normals)
-    grown = regrow_ends(bent)
+    grown = regrow_ends(Curve.of(bent))
     np.testing.assert_allclose(tip(grown), [LENGTH - R / 2, 0, 0], atol=0.2 * R)
     limbs = grown.vertices[np.abs(grown.vertices[:, 1]) < 1]
     assert np.abs(limbs[:, 1:]).max() < 0.2 * R
@@ -94,7 +95,9 @@ def test_a_wire_on_a_thick_hub_keeps_its_bend():
     edges = [[0, 60], [0, 61], *([i, i + 1] for i in range(59))]
     owner = np.concatenate([np.zeros(8000, int), place])
     points, radii = np.concatenate([hub, axis[place] + thin * out]), np.full(62, thin)
-    grown = regrow_ends(Skeleton(vertices, sorted(edges), radii, owner, points, np.concatenate([hub / R, out])))
+    grown = regrow_ends(
+        Curve.of(Skeleton(vertices, sorted(edges), radii, owner, points, np.concatenate([hub / R, out])))
+    )
     assert cKDTree(axis).query(grown.vertices[np.abs(grown.vertices[:, 2]) < 1])[0].max() < 2 * thin
 
 
@@ -194,5 +197,5 @@ def test_an_end_that_does_not_leave_its_body_stays(reach, stays):
         normals=np.concatenate([skeleton.normals, body / reach]),
         vertex_of_point=owner,
     )
-    grown = regrow_ends(with_body)
+    grown = regrow_ends(Curve.of(with_body))
     assert np.array_equal(grown.vertices, with_body.vertices) == stays

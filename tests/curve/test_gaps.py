@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from glsk_o3d import Skeleton, Tracer, pipelines, samples
-from glsk_o3d.curve.thin.detect import LEAST_POINTS, without_strays
-from glsk_o3d.curve.merging import scaled, with_gaps
+from glsk_o3d.curve.curve import Curve
+from glsk_o3d.curve.thin.detect import LEAST_POINTS, without_detached_clumps
 
 pytestmark = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
 
@@ -81,8 +81,8 @@ def test_a_handle_leads_through_an_empty_bowl(seed):
 
 
 def test_gaps_have_the_unit_of_their_skeleton():
-    skeleton = with_gaps(Skeleton(np.eye(3), [(0, 1)], np.ones(3), (), (), ()), np.ones((1, 2, 3)))
-    assert scaled(skeleton, 0.25).report.joined == (((0.25,) * 3, (0.25,) * 3),)
+    curve = Curve.of(Skeleton(np.eye(3), [(0, 1)], np.ones(3), (), (), ())).with_gaps(np.ones((1, 2, 3)))
+    assert curve.scaled(0.25).report.joined == (((0.25,) * 3, (0.25,) * 3),)
 
 
 @pytest.mark.parametrize("size", [0.003, 0.03])
@@ -105,7 +105,7 @@ def lone(*counts, edges=()):
     vertex = np.repeat(np.arange(m), counts)
     points, normals = rng.normal(size=(2, len(vertex), 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return Skeleton(10 * rng.normal(size=(m, 3)), edges, np.ones(m), vertex, points, normals)
+    return Curve.of(Skeleton(10 * rng.normal(size=(m, 3)), edges, np.ones(m), vertex, points, normals))
 
 
 @pytest.mark.parametrize(
@@ -120,7 +120,7 @@ def lone(*counts, edges=()):
 )
 def test_how_many_points_make_a_part(counts, left):
     skeleton = lone(*counts, edges=[(0, 1)])
-    found = without_strays(skeleton)
+    found = without_detached_clumps(skeleton)
     assert len(found.vertices) == left
     gone = found.report.n_outliers
     assert gone == sum(counts) - len(found.supporting_points) == np.isnan(found.normals[:, 0]).sum()
@@ -128,8 +128,8 @@ def test_how_many_points_make_a_part(counts, left):
 
 def test_nothing_but_lone_vertices_stays():
     skeleton = lone(5, 50, 500)
-    assert without_strays(skeleton) is skeleton
-    assert without_strays(replace(skeleton, edges=[(0, 1), (1, 2)])).n_components == 1
+    assert without_detached_clumps(skeleton) is skeleton
+    assert without_detached_clumps(replace(skeleton, edges=np.array([(0, 1), (1, 2)]))).n_components == 1
 
 
 def test_two_balls_stay_two():

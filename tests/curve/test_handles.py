@@ -7,8 +7,9 @@ import pytest
 from scipy.spatial import cKDTree
 
 from glsk_o3d import skeletonize
+from glsk_o3d.curve.curve import Curve
+from glsk_o3d.curve.limbs import JunctionLimbs
 from glsk_o3d.curve.shape.handles import Handles
-from glsk_o3d.curve.topology.limbs import Limbs
 from glsk_o3d.filters import refiner
 from glsk_o3d.samples.capsules import union_sample
 
@@ -150,7 +151,7 @@ def test_only_a_thick_body_has_handles(radius, bodies):
     """A bead on a ring of thickness .06."""
     skeleton = skeletonize(ring(0.06, [(0, radius)]))
     assert skeleton.n_loops == 1
-    assert len(Handles(skeleton).bodies) == bodies
+    assert len(Handles(Curve.of(skeleton)).bodies) == bodies
     assert np.abs(np.linalg.norm(skeleton.vertices, axis=1) - 1).max() < 0.15
 
 
@@ -161,7 +162,7 @@ def test_a_thick_ring_with_a_thin_clasp_is_no_body(seed):
     turn = np.abs(np.linspace(-np.pi, np.pi, 64, endpoint=False))
     skeleton = skeletonize(ring(np.interp(turn, [0.4, 0.8, np.pi], [0.05, 0.22, 0.28]), seed=seed))
     assert skeleton.n_loops == 1
-    assert not len(Handles(skeleton).bodies)
+    assert not len(Handles(Curve.of(skeleton)).bodies)
     assert np.abs(np.linalg.norm(skeleton.vertices, axis=1) - 1).max() < 0.15
 
 
@@ -178,7 +179,7 @@ def bead(monkeypatch):
 
 def followed(skeleton, middle):
     """The lines from the middle of a body."""
-    limbs, handles = Limbs(skeleton, np.array([middle])), Handles(skeleton)
+    limbs, handles = JunctionLimbs(skeleton, np.array([middle])), Handles(skeleton)
     paths = [limbs.paths[limb] for limb in limbs.at[middle]]
     return [handles.follow(path, handles.body(paths)) for path in paths]
 

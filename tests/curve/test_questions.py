@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from glsk_o3d import Connector, Contractor, Report, pipelines, samples, skeletonize
+from glsk_o3d.curve.curve import Curve
+from glsk_o3d.curve.surface import LEAST_INSIDE, Evidence, Surface
 from glsk_o3d.curve.topology import loops, spurs
-from glsk_o3d.curve.topology.evidence import LEAST_INSIDE, Evidence
 from glsk_o3d.curve.topology.loops import CLEAR_SIGHT, WIDE_OPEN, WIDEST_FIRST, loop_facts
 from glsk_o3d.geometry.cycles import minimum_cycle_basis
 from glsk_o3d.geometry.neighbourhoods import nearest_neighbours
@@ -25,6 +26,10 @@ ACROSS = [[(-1, y, 0), (0, y, 0), (1, y, 0)] for y in (0, 0.5)] + [[(0, 0, 0), (
 SIDES = pytest.mark.parametrize("side", [None, Z + 0.3 * Y], ids=["whole", "one side"])
 
 
+def by_path(candidates):
+    return sorted(candidates, key=lambda each: each.part.tolist())
+
+
 def counts(skeleton):
     return skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)
 
@@ -37,7 +42,12 @@ def assert_unchanged(skeleton, raw):
 
 def evidence_of(points, normals):
     _, neighbours = nearest_neighbours(points, AREA_NEIGHBOURS + 1)
-    return Evidence(np.arange(len(points)), points, neighbours, normals)
+    return Surface(np.arange(len(points)), points, neighbours, normals)
+
+
+def oriented(skeleton):
+    curve = Curve.of(skeleton)
+    return Evidence(curve, Surface.of(curve).oriented(curve))
 
 
 # ---- loops
@@ -62,7 +72,7 @@ def strands(piped, gap, length, **options):
 
 def facts_of_the_loop(ring):
     cycles = minimum_cycle_basis(len(ring.vertices), ring.edges, ring.edge_lengths)
-    (loop,) = loop_facts(ring, cycles, Evidence.of(ring))
+    (loop,) = loop_facts(cycles, oriented(ring))
     return loop.facts
 
 
@@ -73,13 +83,13 @@ def passage_of(ring):
 @pytest.mark.parametrize("lines", [TORUS, LADDER], ids=["torus", "ladder"])
 def test_the_widest_sights_are_enough_to_find_the_passage(piped, monkeypatch, lines):
     """Other places are only asked about if they could be better."""
-    ring, asked, winding = piped(lines), list[int](), Evidence.winding
-    monkeypatch.setattr(Evidence, "winding", lambda self, places: asked.append(len(places)) or winding(self, places))
+    ring, asked, winding = piped(lines), list[int](), Surface.winding
+    monkeypatch.setattr(Surface, "winding", lambda self, places: asked.append(len(places)) or winding(self, places))
     cycles, found = minimum_cycle_basis(len(ring.vertices), ring.edges, ring.edge_lengths), []
     for first in (1, WIDEST_FIRST, 10**6):
         monkeypatch.setattr(loops, "WIDEST_FIRST", first)
         asked.clear()
-        facts = [loop.facts for loop in loop_facts(ring, cycles, Evidence.of(ring))]
+        facts = [loop.facts for loop in loop_facts(cycles, oriented(ring))]
         found.append((facts, sum(asked)))
     (one, _), (some, few), (every, all_places) = found
     assert one == some == every
@@ -159,11 +169,11 @@ def test_a_passage_is_found_beside_the_wall_of_a_pot(piped):
 @pytest.mark.parametrize("inside", [1, 0.35, 0.25, 0.1, -0.2])
 def test_a_loop_is_as_probable_as_it_has_an_inside(piped, monkeypatch, inside):
     """A ring as thin as its points are apart has little, and a loop in air none, whatever else speaks for it."""
-    ring, full = piped(TORUS), Evidence.winding
+    ring, full = piped(TORUS), Surface.winding
     cycles = minimum_cycle_basis(len(ring.vertices), ring.edges, ring.edge_lengths)
-    monkeypatch.setattr(Evidence, "winding", lambda self, places: inside * full(self, places))
-    (loop,) = loop_facts(ring, cycles, Evidence.of(ring))
-    assert loop.probability == pytest.approx(np.clip(2 * inside / LEAST_INSIDE - 1, 0, 1), abs=0.05)
+    monkeypatch.setattr(Surface, "winding", lambda self, places: inside * full(self, places))
+    (loop,) = loop_facts(cycles, oriented(ring))
+    assert loop.certainty == pytest.approx(np.clip(2 * inside / LEAST_INSIDE - 1, 0, 1), abs=0.05)
 
 
 @SIDES
@@ -238,10 +248,10 @@ def test_a_stub_in_a_flat_end_says_as_little_whatever_is_beside_it(piped, monkey
     """Prongs of the curve in the end of a tube stand out of nothing; the tube does, if nothing is beside it."""
     prongs = [[(0.9, 0, 0), (0.9, y, 0)] for y in (0.08, -0.08)]
     bar = piped([[(-1, 0, 0), (0.9, 0, 0)], *prongs], around=TUBE, step=0.04)
-    evidence, facts = Evidence.of(bar), []
+    evidence, facts = oriented(bar), []
     for shared in (0, 1):
         monkeypatch.setattr(spurs, "_beside", lambda *given, shared=shared: np.full(len(given[3]), shared))
-        facts.append([each["protrusion"] for _, each in sorted(spurs.limb_facts(bar, evidence))])
+        facts.append([each.facts["protrusion"] for each in by_path(spurs.Limbs().candidates(evidence, 0.5))])
     apart, within = np.array(facts)
     stub = apart < 0
     assert stub.tolist() == [False, True, True]

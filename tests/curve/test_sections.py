@@ -7,7 +7,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from glsk_o3d import samples, skeletonize
-from glsk_o3d.curve.axis.sections import measure_sections
+from glsk_o3d.curve.curve import Curve
+
+
+def measure_sections(skeleton):
+    return Curve.of(skeleton).sections
 
 
 def half_axes(sections):

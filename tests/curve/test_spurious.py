@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d import Skeleton, pipelines, samples
+from glsk_o3d.curve.curve import Curve
 from glsk_o3d.curve.thin.trace import drop_spurious
 
 SCATTER = 0.1  # root mean square distance
@@ -25,7 +26,7 @@ def limb(*twigs, confidence=0.0, n=2000):
     vertex = np.abs(points[:, :1] - np.linspace(0, 10, 41)).argmin(axis=1)
     sure = np.where(np.arange(len(vertices)) < 41, confidence, 0.0)
     radius = SCATTER if confidence else MEDIAN * SCATTER
-    return Skeleton(vertices, edges, np.full(len(vertices), radius), vertex, points, (), confidence=sure)
+    return Curve.of(Skeleton(vertices, edges, np.full(len(vertices), radius), vertex, points, (), confidence=sure))
 
 
 def drop(skeleton, root=None):

@@ -6,8 +6,9 @@ from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton, skeletonize
 from glsk_o3d.curve.axis.fit import fit_axis
+from glsk_o3d.curve.curve import Curve
 from glsk_o3d.curve.shape.wide_ends import _wide_end, level_wide_ends
-from glsk_o3d.curve.topology.evidence import SurfaceGraph
+from glsk_o3d.curve.surface import Surface
 
 
 def paddle(n=4000, disc=0.25, handle=0.04, thick=0.03, seed=0):
@@ -35,7 +36,8 @@ def led(curve, points, normals):
     m = len(curve)
     edges = np.column_stack([np.arange(m - 1), np.arange(1, m)])
     given = Skeleton(curve, edges, np.full(m, 0.03), cKDTree(curve).query(points)[1], points, normals)
-    surface = SurfaceGraph.of(given)
+    given = Curve.of(given)
+    surface = Surface.of(given)
     given = fit_axis(given, 1, surface)
     return given, level_wide_ends(given, surface)
 

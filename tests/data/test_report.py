@@ -5,7 +5,6 @@ import dataclasses
 import json
 import re
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import pytest
 
@@ -85,11 +84,8 @@ def test_sampled_only_where_a_cloud_was_large(counts, sampled):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Doubt(Filter[Contraction]):
+class Doubt(Filter[Contraction, Contraction]):
     """A filter of somebody else's that warns."""
-
-    consumes: ClassVar[type] = Contraction
-    produces: ClassVar[type] = Contraction
 
     def run(self, given, context):
         return replace(given, report=given.report.with_warning("doubtful: so it is"))

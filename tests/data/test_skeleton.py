@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glsk_o3d import InvalidParameterError, Skeleton
-from glsk_o3d.data.skeleton import NOT_MEASURED
 
 
 def skeleton_of(m, edges):
@@ -116,7 +115,16 @@ def test_confidence_and_half_axes_are_those_that_were_measured():
     assert moved.confidence.tolist() == [1, 0.5]
     assert (moved.half_width.tolist(), moved.half_thickness.tolist()) == ([2, 4], [1, 1])
     assert moved.confidence.dtype == moved.half_width.dtype == np.float64
-    one = dataclasses.replace(measured, **NOT_MEASURED, vertices=[[0, 0, 0]], edges=[], radii=[3])
+    one = dataclasses.replace(
+        measured,
+        vertices=[[0, 0, 0]],
+        edges=[],
+        radii=[3],
+        confidence=None,
+        half_width=None,
+        half_thickness=None,
+        support=None,
+    )
     assert np.isnan(one.confidence).tolist() == [True]
     assert one.half_width.tolist() == one.half_thickness.tolist() == [3]
 
