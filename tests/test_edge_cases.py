@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import glsk_o3d as glsk
-from glsk_o3d import InvalidCloudError, Sampler, SkeletonWarning, pipelines, samples, skeletonize
+from glsk_o3d import InvalidCloudError, SkeletonWarning, pipelines, samples, skeletonize
 
 NAMES = ("default", *(pytest.param(name, marks=pytest.mark.slow) for name in pipelines.PIPELINES if name != "default"))
 RNG = np.random.default_rng(0)
@@ -131,12 +131,6 @@ def test_refused_clouds(case):
         run(cloud, "default")
 
 
-@pytest.mark.parametrize("scale", [1e-300, 1e-130, 1e130, 1e306])
-def test_extreme_sizes_are_refused(scale):
-    with pytest.raises(InvalidCloudError, match="rescale"):
-        run(Y * scale, "default")
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_odd_sizes_are_like_any(name):
     plain = run(Y, name)
@@ -190,15 +184,6 @@ def test_invalid_points_can_be_dropped(name, assert_sound):
     few[7:] = np.inf
     with pytest.raises(InvalidCloudError, match="6 "):
         run(few, dropping)
-
-
-@pytest.mark.parametrize("name", ["wen2024", "cao2010", "default"])
-def test_two_components_are_skeletonised_each(name):
-    skeleton = run(SOUND["two components"], name)
-    assert skeleton.n_components >= 2
-    side = skeleton.vertices[:, 0] > 1.5
-    np.testing.assert_array_equal(side[skeleton.vertex_of_point], np.repeat([False, True], 300))
-    assert (side[skeleton.edges[:, 0]] == side[skeleton.edges[:, 1]]).all()
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -255,26 +240,6 @@ def test_what_is_a_copy_is_said_by_the_spacing(apart):
             single.n_loops,
             len(single.leaves),
         )
-
-
-@pytest.mark.parametrize("copies", [2, 16, 40])
-def test_many_near_copies_are_copies(copies):
-    """Also where all neighbours of a point are its copies, and far outliers say nothing about the spacing."""
-    rng = np.random.default_rng(0)
-    cloud = samples.two_rings(600).points
-    moved = np.repeat(cloud, copies, axis=0)
-    moved += 1e-10 * rng.normal(size=moved.shape)
-    for far in ([], [[300.0, 0, 0], [0, -200.0, 0]]):
-        state = Sampler(size="all")(np.concatenate([moved, np.reshape(far, (-1, 3))]))
-        assert len(state.cloud) == len(cloud) + len(far)
-
-
-@pytest.mark.parametrize("ratio", [1e-4, 1e-5, 1e-7])
-def test_a_small_object_beside_a_large_one_is_no_place_with_copies(ratio):
-    small, large = samples.torus(2000).points, samples.torus(4000).points
-    state = Sampler(size="all")(np.concatenate([ratio * small, large + [5, 0, 0]]))
-    assert len(state.cloud) == 6000
-    assert len(Sampler(size="all")(np.outer(np.logspace(-9, 0, 3000), [1, 2, 3])).cloud) == 3000
 
 
 def assert_equal_curves(one, other):

@@ -112,14 +112,6 @@ def test_numbers_of_degenerate_clouds_are_finite(watched, how):
     assert done >= 18
 
 
-@pytest.mark.parametrize("seed", [3, 7])
-def test_a_junction_without_points_near(watched, seed):
-    """Copies of few points that hardly differ: bridges lead through places from which all points are very far away."""
-    ring, rng = samples.two_rings(250).points, np.random.default_rng(seed)
-    copies = np.tile(ring, (5, 1))
-    assert run(copies + 1e-10 * rng.normal(size=copies.shape), pipelines.default().stages) is not None
-
-
 @pytest.mark.parametrize("away", [0.0, 1.0, 37.0, 38.5, 50.0, 1e6])
 @pytest.mark.parametrize("radius", [0.0, 1e-200, 1e-3])
 def test_where_lines_meet_without_a_surface(away, radius):

@@ -151,12 +151,6 @@ def test_only_filters_can_be_joined_and_only_pipelines_run(thing):
         Pipeline()
 
 
-@pytest.mark.parametrize("incomplete", [RingBuilder(), RingBuilder() | Contractor()], ids=repr)
-def test_incomplete_pipelines_are_refused(incomplete):
-    with pytest.raises(InvalidParameterError):
-        skeletonize(POINTS, incomplete)
-
-
 # ---- other options
 
 
@@ -172,14 +166,6 @@ def test_options_by_full_and_by_short_name():
         | tracer
     )
     assert pipelines.default().with_options() == pipelines.default().with_options({}) == pipelines.default()
-
-
-def test_options_reach_every_filter_of_the_name():
-    twice = Contractor(reducer=LPRReducer()) | LPRReducer() | Contractor()
-    varied = twice.with_options(phi=3, max_iterations=2)
-    assert varied == (
-        Contractor(reducer=LPRReducer(phi=3), max_iterations=2) | LPRReducer(phi=3) | Contractor(max_iterations=2)
-    )
 
 
 @pytest.mark.parametrize("order", [1, -1])
@@ -296,11 +282,6 @@ def test_what_stops_a_contraction(answer):
     stopped = skeletonize(POINTS, on_iteration=lambda record: answer if record.iteration == 2 else None)
     assert len(stopped.report.iterations) == 2
     assert stopped.report.stop_reason == "stopped by the caller"
-
-
-@pytest.mark.parametrize("answer", [None, True, np.True_, 1, "", [], object()])
-def test_what_does_not(answer):
-    assert_same(skeletonize(POINTS, on_iteration=lambda record: answer), skeletonize(POINTS))
 
 
 def test_what_a_caller_does_to_a_state_does_not_change_the_run():

@@ -82,38 +82,6 @@ def test_an_end_bent_into_a_corner_where_others_have_the_points_is_straightened(
     assert np.abs(limbs[:, 1:]).max() < 0.2 * R
 
 
-def test_a_wire_on_a_thick_hub_keeps_its_bend():
-    """Points of the hub, which its first vertex owns, do not say that the wire has hardly any."""
-    rng, thin, turn = np.random.default_rng(0), R / 20, np.linspace(0, 3, 60)
-    hub = rng.normal(size=(8000, 3))
-    hub *= R / np.linalg.norm(hub, axis=1, keepdims=True)
-    axis = R * np.column_stack([np.sin(turn), 1 - np.cos(turn), 0 * turn])
-    place, angle = rng.uniform(1, 58, 150).astype(int), rng.uniform(0, 2 * np.pi, (150, 1))
-    side = np.column_stack([-np.sin(turn), np.cos(turn), 0 * turn])[place]
-    out = np.cos(angle) * side + np.sin(angle) * [0, 0, 1]
-    vertices = np.concatenate([axis, [[0, 0, 5], [0, 0, -5]]])
-    edges = [[0, 60], [0, 61], *([i, i + 1] for i in range(59))]
-    owner = np.concatenate([np.zeros(8000, int), place])
-    points, radii = np.concatenate([hub, axis[place] + thin * out]), np.full(62, thin)
-    grown = regrow_ends(
-        Curve.of(Skeleton(vertices, sorted(edges), radii, owner, points, np.concatenate([hub / R, out])))
-    )
-    assert cKDTree(axis).query(grown.vertices[np.abs(grown.vertices[:, 2]) < 1])[0].max() < 2 * thin
-
-
-def test_the_end_of_a_long_bent_limb_is_not_cut_by_its_length():
-    """A fiftieth of the points of a spring are eight of its radii: they stay as they are, but for the cap."""
-    turn = np.linspace(0, 10 * np.pi, 40_000)
-    axis = np.column_stack([np.cos(turn), np.sin(turn), turn / 20])
-    rng, way = np.random.default_rng(0), np.gradient(axis, axis=0)
-    place = rng.integers(0, len(axis), 8000)
-    out = np.cross(way[place], rng.normal(size=(8000, 3)))
-    points = axis[place] + 0.08 * out / np.linalg.norm(out, axis=1, keepdims=True)
-    found = skeletonize(points)
-    assert cKDTree(axis).query(found.vertices)[0].max() < 0.4 * 0.08
-    assert cKDTree(found.vertices).query(axis[[0, -1]])[0].max() < 0.08
-
-
 def bottle(thin, long, n=6000):
     """A tube of radius R with a neck of that radius and length, and faces at its shoulder and at the end."""
     rng = np.random.default_rng(0)
@@ -134,15 +102,6 @@ def test_a_neck_goes_on_beyond_its_shoulder(refine, thin, long, stop):
     end = np.flatnonzero((found.vertices == tip(found)).all(axis=1))
     np.testing.assert_allclose(tip(found), [LENGTH + (long - thin / 2) * R, 0, 0], atol=0.1 * R)
     np.testing.assert_allclose(found.radii[end], thin * R, rtol=0.1)
-
-
-@pytest.mark.parametrize("cap", ["flat", "round"])
-def test_half_a_limb_is_enough(refine, cap):
-    """Seen from one side."""
-    points, normals = limb(cap)
-    seen = points[:, 1] > 0
-    found = tip(refine(fork(points[seen], normals[seen], LENGTH, 1), recentre=3))
-    np.testing.assert_allclose(found, [LENGTH - (cap == "flat") * R / 2, 0, 0], atol=0.2 * R)
 
 
 def test_new_vertices_are_like_those_behind(refine):

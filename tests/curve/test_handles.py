@@ -1,16 +1,12 @@
 """Handles: their curves keep to their axes up to the wall of the body, and go straight on to its middle."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
 from glsk_o3d import skeletonize
 from glsk_o3d.curve.curve import Curve
-from glsk_o3d.curve.limbs import JunctionLimbs
 from glsk_o3d.curve.shape.handles import Handles
-from glsk_o3d.filters import refiner
 from glsk_o3d.samples.capsules import union_sample
 
 BODY, HANDLE, REACH = 0.4, 0.06, 0.28
@@ -166,44 +162,6 @@ def test_a_thick_ring_with_a_thin_clasp_is_no_body(seed):
     assert np.abs(np.linalg.norm(skeleton.vertices, axis=1) - 1).max() < 0.15
 
 
-def bead(monkeypatch):
-    """A skeleton of a ring with a bead, as the junctions are moved from, its middle, and the size of the ring in it."""
-    given = []
-    monkeypatch.setattr(refiner, "move_junctions", lambda skeleton: given.append(skeleton) or skeleton)
-    points = ring(0.06, [(0, 0.4)])
-    skeletonize(points)
-    (skeleton,) = given
-    (middle,) = Handles(skeleton).bodies
-    return skeleton, int(middle), np.ptp(points) / np.ptp(skeleton.points)
-
-
-def followed(skeleton, middle):
-    """The lines from the middle of a body."""
-    limbs, handles = JunctionLimbs(skeleton, np.array([middle])), Handles(skeleton)
-    paths = [limbs.paths[limb] for limb in limbs.at[middle]]
-    return [handles.follow(path, handles.body(paths)) for path in paths]
-
-
-@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
-def test_handles_are_followed_to_the_wall_and_from_either_end(monkeypatch):
-    skeleton, middle, size = bead(monkeypatch)
-    lines = followed(skeleton, middle)
-    assert len(lines) == 2
-    assert sum(line.start for line in lines) < skeleton.edge_lengths.sum()
-    for line in lines:
-        inwards = [1, 0, 0] - line.lead[0] * size
-        assert abs(np.linalg.norm(inwards) - 0.4) < 0.09
-        assert line.way @ inwards > 0.9 * np.linalg.norm(inwards)
-
-
-@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
-def test_a_handle_that_breaks_off_before_the_wall_is_not_followed(monkeypatch):
-    skeleton, middle, size = bead(monkeypatch)
-    away = np.linalg.norm(skeleton.points * size - [1, 0, 0], axis=1)
-    seen = np.where((away > 0.45) & (away < 0.9), -1, skeleton.vertex_of_point)
-    assert followed(replace(skeleton, vertex_of_point=seen), middle) == [None, None]
-
-
 def test_junctions_are_in_the_middle_of_balls():
     """Of a frame of thin bars between balls, all of which are handles of these."""
     corner = np.array(list(np.ndindex(2, 2, 2)), float)
@@ -212,15 +170,3 @@ def test_junctions_are_in_the_middle_of_balls():
     skeleton = skeletonize(union_sample("frame", nodes, edges, radii, 8000, 0.0, 0).points)
     assert (len(skeleton.junctions), skeleton.n_loops) == (8, 5)
     assert cKDTree(corner).query(skeleton.vertices[skeleton.junctions])[0].max() < 0.06
-
-
-@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
-def test_a_handle_keeps_to_its_axis_whatever_is_said_of_its_direction_in_the_wall(monkeypatch):
-    follow = Handles.follow
-
-    def turned(self, path, body):
-        line = follow(self, path, body)
-        return line and line._replace(way=-line.way)
-
-    monkeypatch.setattr(Handles, "follow", turned)
-    assert off_axis(skeletonize(pot([1])), 1).max() < 0.5

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glsk_o3d import Skeleton, pipelines, samples
+from glsk_o3d import Skeleton
 from glsk_o3d.curve.curve import Curve
 from glsk_o3d.curve.thin.trace import drop_spurious
 
@@ -66,11 +66,3 @@ def test_the_root_stays_the_root_when_others_before_it_go():
     left = drop(limb((20, SCATTER), (20, -1.2 * SCATTER), (20, 1.5 * SCATTER)), root=46)
     assert len(left.leaves) == 3
     assert left.vertices[:, 1].max() == 1.5 * SCATTER
-
-
-@pytest.mark.slow
-def test_noise_as_wide_as_twigs_makes_few_false_tips():
-    """Beside the root and 16 true ones fewer than half of those that there are without the rule: the mean of trees."""
-    left = [pipelines.tree()(samples.tree(4096, forks=4, noise=0.002, seed=seed).points) for seed in range(4)]
-    assert min(skeleton.report.n_traced for skeleton in left) > 500
-    assert 17 <= np.mean([len(skeleton.leaves) for skeleton in left]) < 28

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from glsk_o3d import pipelines, skeletonize
+from glsk_o3d import skeletonize
 from glsk_o3d.geometry.polylines import places_on_edges
 
 pytestmark = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
@@ -71,40 +71,3 @@ def test_a_part_scattered_as_thick_as_it_is_wide_is_no_bundle_of_twigs(n, severa
     found = skeletonize(clumps(n, several, seed))
     assert found.report.n_traced == 0
     assert len(found.leaves) < 10
-
-
-def test_scattered_rings_have_one_loop_not_those_of_wires():
-    rng = np.random.default_rng(0)
-    (turn, side), out = 2 * np.pi * rng.random((2, 500)), np.sqrt(rng.random(500))
-    wide = 3.5 + 0.7 * out * np.cos(side)
-    ring = np.column_stack([wide * np.cos(turn), wide * np.sin(turn), 0.7 * out * np.sin(side)])
-    cloud = ring[rng.integers(500, size=1000)] + 0.2 * rng.gamma(1, size=(1000, 1)) * rng.normal(size=(1000, 3))
-    found = skeletonize(cloud)
-    assert (found.n_components, found.n_loops) == (1, 1)
-
-
-def arbor(seed):
-    """A long cable that ends in an arbor of twigs a fifth as thick, which fork six times."""
-    rng = np.random.default_rng(seed)
-    nodes, edges, ways = [np.zeros(3), np.array([0, 0, 60.0])], [(0, 1)], [(1, np.array([0, 0, 1.0]))]
-    for _ in range(6):
-        grown = []
-        for fork, way in ways:
-            for _ in range(2):
-                turn = way + 0.8 * rng.standard_normal(3)
-                turn /= np.linalg.norm(turn)
-                nodes.append(nodes[fork] + turn * rng.uniform(0.9, 1.6))
-                edges.append((fork, len(nodes) - 1))
-                grown.append((len(nodes) - 1, turn))
-        ways = grown
-    return np.array(nodes), np.array(edges), np.where(np.arange(len(edges)), 0.05, 0.25)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("n", [60_000, 100_000, 300_000])
-def test_more_points_do_not_find_less_of_thin_parts(n):
-    """Whose length is that of few vertices one per cent of the diagonal apart."""
-    nodes, edges, radius = arbor(0)
-    found = pipelines.default()(tubes(nodes, edges, radius, n))
-    length = np.linalg.norm(nodes[edges[:, 0]] - nodes[edges[:, 1]], axis=1).sum()
-    assert found.length == pytest.approx(length, rel=0.1)

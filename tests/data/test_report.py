@@ -45,11 +45,6 @@ def test_an_entry_of_another_type_is_refused_or_means_the_same(report, name):
             assert json.dumps(again) in (json.dumps(value), "{}", "[]")
 
 
-def test_places_on_a_map_keep_their_digits():
-    told = Decision("loop", (450123.456789, 5600321.987654, -0.0123456), 0.5, changed=False).question
-    assert told == "the loop at (450123.46, 5600321.99, -0.01235) is a handle"
-
-
 def test_print_says_the_main_things_in_about_ten_lines():
     report = Report(
         n_input=900,

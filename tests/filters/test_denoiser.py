@@ -8,28 +8,10 @@ from hypothesis import strategies as st
 from glsk_o3d import Denoiser, OutlierRemover, RingBuilder, Sampler, samples
 from glsk_o3d.data.points import CLEAN_SPHERICITY, NOISE_SPHERICITY, noise_share
 from glsk_o3d.filters.denoiser import RIDGE_NEIGHBOURS, subspace_mean_shift, to_ridges
-from glsk_o3d.geometry.neighbourhoods import nearest_neighbours, principal
 
 PREPARED = Sampler() | OutlierRemover() | Denoiser()
 
 TURN = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
-
-
-def noise_of(points, k=16):
-    neighbours = nearest_neighbours(points, k)[1]
-    return noise_share(principal(points, neighbours)[0], neighbours)
-
-
-def cylinder(noise, n=1200, seed=0):
-    """Of radius 1 along x."""
-    rng = np.random.default_rng(seed)
-    angle = rng.uniform(0, 2 * np.pi, n)
-    surface = np.column_stack([rng.uniform(-2, 2, n), np.cos(angle), np.sin(angle)])
-    return surface + noise * rng.normal(size=(n, 3))
-
-
-def from_surface(points):
-    return np.abs(np.hypot(points[:, 1], points[:, 2]) - 1)[np.abs(points[:, 0]) < 1.5].mean()
 
 
 def thread(noise=0.2, n=400):
@@ -54,24 +36,7 @@ def test_noise_share_by_its_definition(seed, n, k):
     np.testing.assert_allclose(noise_share(spread, neighbours), expected, atol=1e-12)
 
 
-def test_a_ball_is_noise_and_a_surface_is_none():
-    assert np.median(noise_of(np.random.default_rng(0).normal(size=(1000, 3)))) > 0.8
-    assert noise_of(cylinder(0)).max() == 0
-    # and in between it grows with the noise
-    grown = [noise_of(cylinder(noise)).mean() for noise in (0.05, 0.1, 0.2, 0.4)]
-    assert (np.diff(grown) > 0).all()
-
-
 # ---- subspace-constrained mean shift
-
-
-def test_points_of_a_noisy_cylinder_come_nearer_to_it():
-    points = cylinder(0.2)
-    moved = subspace_mean_shift(points, noise_of(points), 4)
-    assert from_surface(moved) < 0.6 * from_surface(points)
-    # on it, not in it
-    radius = np.hypot(moved[:, 1], moved[:, 2])[np.abs(moved[:, 0]) < 1.5]
-    assert np.mean(radius) == pytest.approx(1, abs=0.05)
 
 
 @pytest.mark.parametrize("share", [1, 0.25])

@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-import glsk_o3d as glsk
 from glsk_o3d import (
     Connector,
     Contractor,
@@ -121,16 +120,6 @@ def test_random_graphs(assert_sound, m, edges, seed):
             skeleton.component_of_vertex[skeleton.vertex_of_point[:-1]],
         )
         assert len(set(zip(before.tolist(), after.tolist(), strict=True))) == raw.n_components
-
-
-@pytest.mark.filterwarnings("ignore:uncertain topology")  # whether they touch is a close call
-@pytest.mark.slow
-def test_a_loop_that_is_cut_leaves_no_spurs():
-    """Two legs of a scan touch; the ends of the cut loop are no ends of the animal."""
-    skeleton = glsk.skeletonize(samples.sample_object(seed=6).points)
-    assert (skeleton.n_loops, len(skeleton.leaves)) == (1, 6)
-    assert np.isfinite(skeleton.confidence).all()
-    assert (skeleton.radii > 0).all()
 
 
 @pytest.mark.parametrize(("cut", "bridged", "asked"), [(0, 0, [1]), (0, 1, [1, 2]), (1, 1, [1, 1])])

@@ -173,14 +173,6 @@ def test_every_door_samples_it(axis, tmp_path):
     assert meshes.current_mesh().face_number() == len(PIPE.triangles)
 
 
-@pytest.mark.parametrize("name", ["tree", "wen2024", "cao2010"])
-def test_every_pipeline_samples_it(name):
-    skeleton = glsk.skeletonize(PIPE, name, sample=4096)
-    assert skeleton.report.n_by_area == 4096
-    assert skeleton.n_components == 1
-    assert abs(skeleton.length - 47) < 2
-
-
 def test_the_choice_of_a_sample():
     dense = o3d.geometry.TriangleMesh.create_torus(1, 0.3, 90, 30)
     for choice, n in (("auto", 0), ("vertices", 0), (3000, 3000), (np.int64(500), 500)):
@@ -209,13 +201,6 @@ def test_vertices_that_are_not_finite_and_corners_that_are_missing():
         mesh.triangles = o3d.utility.Vector3iVector(np.append(triangles, [[0, 1, corner]], axis=0))
         with pytest.raises(glsk.InvalidCloudError, match="none of the 98 vertices"):
             glsk.skeletonize(mesh)
-
-
-def test_samples_of_a_sampled_mesh_support_its_skeleton():
-    skeleton = glsk.support(PIPE, draws=2, sample=4096)
-    assert skeleton.report.n_agreeing == 2
-    assert skeleton.support.min() == 1
-    assert len(skeleton.whole.points) == len(PIPE.vertices) + 4096
 
 
 def test_files_keep_the_sample_of_a_mesh(tmp_path, axis):
@@ -272,16 +257,6 @@ def test_a_sample_by_area_of_a_cloud_is_told_from_one_of_a_mesh(tmp_path):
     assert len(glsk.read_tensor_cloud(tmp_path / "pipe.ply", sample=700).point.positions) == 700
     with pytest.raises(glsk.InvalidParameterError, match="sample"):
         glsk.read_cloud(tmp_path / "pipe.ply", sample="all")
-
-
-def test_what_is_measured_on_the_surface_takes_the_sample(axis, tmp_path):
-    found = glsk.analysis.assess(axis, PIPE)
-    assert min(found.centredness, found.boundedness, found.topology) > 0.95
-    grasps = grasp_candidates(axis, 4.0)
-    glsk.save_skeleton(axis, tmp_path / "s.json")
-    read = glsk.read_skeleton(tmp_path / "s.json")
-    for cloud in (None, PIPE):
-        assert len(grasp_candidates(read, 4.0, cloud=cloud)) == len(grasps) > 0
 
 
 def test_a_scene_of_meshes_is_sampled_before_it_is_cut_into_tiles(tmp_path):

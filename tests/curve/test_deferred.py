@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glsk_o3d import Refiner, Skeleton, Tracer, pipelines, samples, skeletonize
+from glsk_o3d import Refiner, Skeleton, Tracer, samples, skeletonize
 from glsk_o3d.curve.curve import Curve
 from glsk_o3d.curve.thin.deferred import Deferred
 
@@ -33,18 +33,12 @@ def test_a_crown_is_set_aside_and_the_trunk_is_not(crown):
     assert 60 < len(refined.leaves) < 75  # 65 of the tree
 
 
-def test_it_makes_no_difference_to_what_a_tree_is(crown, monkeypatch):
-    monkeypatch.setattr(Deferred, "of", lambda *_: None)
-    whole = skeletonize(crown[0].points)
-    assert abs(len(whole.leaves) - len(crown[0].leaves)) < 5
-    assert abs(whole.length / crown[0].length - 1) < 0.02
-    trunk = [s.radii[np.argmin(s.vertices[:, 2])] for s in (whole, crown[0])]
-    np.testing.assert_allclose(*trunk, rtol=0.05)
-
-
 def test_it_comes_back_as_it_was(crown):
     _, aside = crown
-    whole, back = aside.whole, aside.put_back(aside.rest())
+    whole, rest = aside.whole, aside.rest()
+    back = aside.put_back(rest)
+    assert rest.vertex_of_point.max() < len(rest.vertices) == (~aside.gone).sum()
+    np.testing.assert_array_equal(rest.points, whole.points[aside.rows])
     order = np.concatenate([np.flatnonzero(~aside.gone), np.flatnonzero(aside.gone)])
     for name in ALL:
         np.testing.assert_array_equal(getattr(back, name), getattr(whole, name)[order])
@@ -56,15 +50,6 @@ def test_it_comes_back_as_it_was(crown):
     lost = len(whole.edges) - len(edges)
     assert lost <= whole.n_loops  # of what was set aside only a forest is left
     assert back.n_components == whole.n_components
-
-
-def test_the_rest_has_its_own_points(crown):
-    _, aside = crown
-    rest = aside.rest()
-    assert len(rest.points) == len(aside.rows) == (~aside.gone[aside.whole.vertex_of_point]).sum()
-    np.testing.assert_array_equal(rest.points, aside.whole.points[aside.rows])
-    assert rest.vertex_of_point.min() == 0
-    assert rest.vertex_of_point.max() < len(rest.vertices) == (~aside.gone).sum()
 
 
 def grid(n):
@@ -82,14 +67,11 @@ def grid(n):
     return Skeleton(vertices, edges, zeros + 0.1, vertex, points, normals, confidence=zeros)
 
 
-def test_what_is_mostly_on_loops_is_not_set_aside():
+def test_what_is_small_or_mostly_on_loops_is_not_set_aside():
     net = grid(24)
     assert Deferred.of(Curve.of(net), 0.65) is None
-    assert Deferred.of(Curve.of(comb()), 0.65).gone.all()
-
-
-def test_small_skeletons_are_not_set_aside():
     assert Deferred.of(Curve.of(comb(12)), 0.65) is None
+    assert Deferred.of(Curve.of(comb()), 0.65).gone.all()
 
 
 def comb(n=24, more=()):
@@ -154,29 +136,11 @@ def test_points_without_a_vertex_have_none_afterwards():
     np.testing.assert_array_equal(aside.put_back(aside.rest()).vertex_of_point, owner)
 
 
-def test_a_loop_is_opened_unless_all_are_to_be_kept():
+def test_a_loop_is_opened_unless_all_are_to_be_kept_and_all_can_be_judged(monkeypatch):
     lines = comb(more=[(5 * 24 + 20, 6 * 24 + 20)])
     assert lines.n_loops == 1
     assert Refiner(recentre=0)(lines).n_loops == 0
     assert Refiner(recentre=0, handle=0, limb=0)(lines).n_loops == 1
-
-
-def test_a_crown_does_not_hang_on_the_order_of_points(crown):
-    refined, _ = crown
-    order = np.random.default_rng(0).permutation(len(refined.points))
-    again = skeletonize(refined.points[order])
-    for name in ("vertices", "edges", "radii"):
-        np.testing.assert_array_equal(getattr(again, name), getattr(refined, name))
-    np.testing.assert_array_equal(again.vertex_of_point, refined.vertex_of_point[order])
-
-
-def test_all_can_be_judged(monkeypatch):
     monkeypatch.setattr(Deferred, "of", lambda *_: pytest.fail("asked"))
-    assert len(Refiner(set_aside=False)(comb()).edges)
-
-
-def test_without_questions_nothing_is_set_aside(monkeypatch):
-    monkeypatch.setattr(Deferred, "of", lambda *_: pytest.fail("asked"))
-    off = {f"Refiner.{option}": 0 for option in ("handle", "limb", "air", "bridge", "recentre")}
-    skeleton = pipelines.default().with_options(off)(samples.tree(4096, forks=6).points)
-    assert len(skeleton.edges)
+    assert len(Refiner(set_aside=False)(lines).edges)
+    assert len(Refiner(recentre=0, handle=0, limb=0)(lines).edges)
