@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from glsk_o3d import InvalidCloudError, Skeleton, Tracer, pipelines, samples
-from glsk_o3d.curve.limbs import Line
-from glsk_o3d.curve.shape.junctions import meet
 from glsk_o3d.filters import refiner
 from glsk_o3d.pipeline import RunContext
 
@@ -110,20 +108,6 @@ def test_numbers_of_degenerate_clouds_are_finite(watched, how):
             assert (skeleton.radii >= 0).all()
             check_finite(Tracer(root="z").run(skeleton, RunContext()), "Tracer")
     assert done >= 18
-
-
-@pytest.mark.parametrize("away", [0.0, 1.0, 37.0, 38.5, 50.0, 1e6])
-@pytest.mark.parametrize("radius", [0.0, 1e-200, 1e-3])
-def test_where_lines_meet_without_a_surface(away, radius):
-    """Points that are far away have no say: what is left are the lines."""
-    ways = np.eye(3)
-    limbs = [Line(-3.0 * way, way, 1.0, 0.0, 0.0, -1.0 * way[None], 1e-3) for way in ways]
-    points = away * 1e-3 * np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]) + [0, 0, 1e-4]
-    with np.errstate(divide="raise", over="raise", invalid="raise"):
-        place, touching = meet(limbs, np.full(3, 1e-4), radius, points, ways)
-    assert np.isfinite([*place, touching]).all()
-    if away > 38 or radius < 1e-3:
-        np.testing.assert_allclose(place, 0, atol=1e-3)
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -36,7 +36,7 @@ skeleton = glsk.skeletonize(cloud, {"RingBuilder.k": 24}, on_iteration=lambda re
 skeleton = glsk.skeletonize(cloud, {"Connector.radius": "2%"}, k=24)
 skeleton = glsk.skeletonize(cloud, k="auto", reducer=None, root=(0, 0, 1), links="nearest")
 skeleton = glsk.skeletonize(cloud, "pipeline of a plugin", option_of_its=3)
-start: Pipeline[Points, Contraction] = RingBuilder(k="auto") | Contractor(reducer=LPRReducer(), stop=ExplainedScore(0.02))
+start: Pipeline[Points, Contraction] = RingBuilder() | Contractor(reducer=LPRReducer(), stop=ExplainedScore(0.02))
 state: Contraction = start(cloud)
 whole: Pipeline[Points, Skeleton] = start | Connector(radius="2%", links="all") | Refiner()
 skeleton = whole(cloud, on_stage=lambda stage: print(stage.kind))

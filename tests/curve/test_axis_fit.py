@@ -117,10 +117,9 @@ def strip(wide=0.3, thick=0.06, wiggle=0.0, n=6000, seed=0):
     return path(curve, np.column_stack([x, y, z]), normals)
 
 
-@pytest.mark.parametrize("wiggle", [0, 0.4, 0.8])
-def test_the_curve_of_a_flat_bar_is_its_midline(wiggle):
+def test_the_curve_of_a_flat_bar_is_its_midline():
     """Whatever way it took over the width before: the places of the points are smoothed on the surface."""
-    moved = fit_axis(strip(wiggle=wiggle), 6)[0][4:-4]
+    moved = fit_axis(strip(wiggle=0.8), 6)[0][4:-4]
     assert np.abs(moved[:, 1]).max() < 0.1 * 0.3
     assert np.abs(moved[:, 2]).max() < 0.02
 
@@ -134,21 +133,8 @@ def test_the_sides_say_where_the_middle_is_if_half_of_the_faces_belongs_to_anoth
     assert np.abs(fit_axis(half, 6, settle=True)[0][4:-4, 1]).max() < 0.1 * 0.3
 
 
-def test_a_hoop_bends_where_it_is_thin():
-    """A band .6 wide and .12 thick around a circle of radius .4: its width does not make the curve any smaller."""
-    bar, big, m = strip(wiggle=0), 0.4, 48
-    turn, out = np.pi / 2 * bar.points[:, 0], np.sqrt(big**2 + 2 * big * bar.points[:, 2])  # as dense inside as outside
-    away, rim = np.column_stack([np.cos(turn), np.sin(turn), 0 * turn]), np.arange(m) / m * 2 * np.pi
-    normals = bar.normals[:, 2:] * away + bar.normals[:, 1:2] * [0, 0, 1]
-    points = out[:, None] * away + bar.points[:, 1:2] * [0, 0, 1]
-    vertices = np.column_stack([0.42 * np.cos(rim), 0.42 * np.sin(rim), 0 * rim + 0.02])
-    moved = fit_axis(path(vertices, points, normals, closed=True), 6, settle=True)[0]
-    assert np.abs(np.hypot(moved[:, 0], moved[:, 1]) - big).max() < 0.25 * 0.06
-    assert np.abs(moved[:, 2]).max() < 0.1 * 0.3
-
-
-@pytest.mark.parametrize(("wide", "thick"), [(0.3, 0.06), (0.2, 0.1)])
-def test_the_section_of_a_flat_bar_is_its_own_and_its_width_is_doubt(wide, thick):
+def test_the_section_of_a_flat_bar_is_its_own_and_its_width_is_doubt():
+    wide, thick = 0.3, 0.06
     fitted = axis_fit.fit_axis(Curve.of(strip(wide, thick)), 3)
     sections = fitted.sections
     np.testing.assert_allclose(sections.half_width[4:-4], wide, rtol=0.02)
@@ -167,26 +153,16 @@ def test_the_section_of_a_flat_bar_is_its_own_and_its_width_is_doubt(wide, thick
     assert ratio.max() < 1.5
 
 
-# ---- noise as wide as the tube
-
-
-def noisy(noise, known):
-    """A tube along x whose points are `noise` radii off; normals in random directions unless they are known."""
-    rng = np.random.default_rng(0)
-    x, angle = rng.uniform(-1, 1, 3000), rng.uniform(0, 2 * np.pi, 3000)
-    normals = np.column_stack([0 * angle, np.cos(angle), np.sin(angle)])
-    points = R * (normals + noise * rng.normal(size=(3000, 3))) + x[:, None] * [1, 0, 0]
-    if not known:
-        normals = rng.normal(size=(3000, 3))
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    off = 0.1 * R * rng.normal(size=(60, 2))
-    return path(np.column_stack([np.linspace(-0.95, 0.95, 60), off]), points, normals)
-
-
 @pytest.mark.parametrize(("noise", "known"), [(0.3, False), (1.0, False), (1.0, True)])
 def test_where_noise_is_the_curve_is_smooth_and_near_the_axis(noise, known):
     """The noise is up to a radius wide, and its normals may point anywhere."""
-    moved = fit_axis(noisy(noise, known=known), 3)[0]
+    rng, given = np.random.default_rng(0), tube(m=60, around=20, along=150)
+    points, normals = given.points + noise * R * rng.normal(size=given.points.shape), given.normals
+    if not known:
+        normals = rng.normal(size=normals.shape)
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    curve = given.vertices + 0.1 * R * rng.normal(size=(60, 3)) * [0, 1, 1]
+    moved = fit_axis(path(curve, points, normals), 3)[0]
     assert off_axis(moved).mean() < 0.25 * R
     # across the axis, not along it: it is as long as it was
     assert np.ptp(moved[:, 0]) == pytest.approx(2 * 0.95, rel=0.05)
@@ -253,8 +229,7 @@ def test_vertices_between_points_bridge_them():
     """Where the middle of a tube was not scanned, the curve is straight from one side to the other."""
     raw = tube((0, 0.05), m=39)
     seen = np.abs(raw.points[:, 0]) > 0.3
-    gap = replace(raw, points=raw.points[seen], normals=raw.normals[seen], vertex_of_point=raw.vertex_of_point[seen])
-    vertices, confidence, _ = fit_axis(gap, 6)
+    vertices, confidence, _ = fit_axis(replace(raw, vertex_of_point=np.where(seen, raw.vertex_of_point, -1)), 6)
     assert off_axis(vertices).max() < 0.02 * R
     middle = np.abs(raw.vertices[:, 0]) < 0.2
     assert (confidence[middle] == 0).all()

@@ -95,7 +95,7 @@ def bottle(thin, long, n=6000):
 
 
 @pytest.mark.parametrize("stop", [-1, 0, 1])
-@pytest.mark.parametrize(("thin", "long"), [(0.3, 1), (0.3, 2), (0.4, 1), (0.4, 1.5)])
+@pytest.mark.parametrize(("thin", "long"), [(0.3, 1), (0.4, 1.5)])
 def test_a_neck_goes_on_beyond_its_shoulder(refine, thin, long, stop):
     """Even one no longer than its limb is thick: the curve ends half its radius inside its face, and as thin as it."""
     found = refine(fork(*bottle(thin * R, long * R), LENGTH + stop * R), recentre=3)
@@ -124,21 +124,6 @@ def test_a_head_that_hangs_from_its_neck_has_an_axis(n, seed):
     nose = body.nodes[np.argmax(body.nodes[:, 0])]
     away = np.linalg.norm(skeleton.vertices[skeleton.leaves] - nose, axis=1)
     assert away.min() < 0.035  # .75 radii there
-
-
-def test_the_radii_of_wide_ends_are_their_own():
-    """Two balls on a bar: the run behind their outer halves is the bar's."""
-    rng = np.random.default_rng(0)
-    ball, turn = rng.standard_normal((5000, 3)), rng.uniform(0, 2 * np.pi, 1500)
-    ball *= 0.3 / np.linalg.norm(ball, axis=1, keepdims=True)
-    ball[:, 0] += np.where(np.arange(5000) % 2, 0.9, -0.9)
-    bar = np.column_stack([rng.uniform(-0.62, 0.62, 1500), 0.1 * np.cos(turn), 0.1 * np.sin(turn)])
-    outside = (np.hypot(ball[:, 1], ball[:, 2]) > 0.1) | (np.abs(ball[:, 0]) > 0.9)
-    found = skeletonize(np.concatenate([ball[outside], bar]))
-    x = np.abs(found.vertices[:, 0])
-    true = np.where(x > 0.62, np.sqrt(np.maximum(0.09 - (x - 0.9) ** 2, 0.01)), 0.1)
-    assert x.max() > 1
-    assert np.abs(found.radii - true)[x > 0.75].mean() < 0.04  # .1 with the run's
 
 
 @pytest.mark.parametrize(("reach", "stays"), [(0.8, True), (0.3, False)])

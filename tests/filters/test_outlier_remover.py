@@ -27,18 +27,14 @@ def floating(n, seed=0, reach=0.6):
     return points[cKDTree(SURFACE).query(points)[0] > 0.05][:n]
 
 
-@pytest.mark.parametrize("n", [1, 200])
-def test_points_that_float_around_a_surface(n):
-    """A few stand out alone; many have each other for neighbours."""
-    points = np.concatenate([SURFACE, floating(n)])
-    np.testing.assert_array_equal(left(points), np.arange(N))
-
-
-@pytest.mark.parametrize("n", [5, 300])
-def test_islands_far_away(n):
-    """Whether their neighbourhoods reach back to the surface, or hold nothing but themselves."""
+@pytest.mark.parametrize("n", [1, 5, 200])
+def test_points_that_float_around_a_surface_or_far_away_go_and_sparse_parts_stay(n):
+    """Whether they stand out alone, or have each other for neighbours."""
     island = [3, 0, 0] + np.random.default_rng(1).uniform(-0.3, 0.3, (n, 3))
-    np.testing.assert_array_equal(left(np.concatenate([SURFACE, island])), np.arange(N))
+    for others in (floating(n), island):
+        np.testing.assert_array_equal(left(np.concatenate([SURFACE, others])), np.arange(N))
+    part = samples.torus(800, ring_radius=0.2, radius=0.05).points + [0.7, 0, 0]  # a quarter of the points for its area
+    assert len(left(np.concatenate([SURFACE, part]))) == N + 800
 
 
 def test_where_each_point_stands_for_many():
