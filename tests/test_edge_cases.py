@@ -191,21 +191,6 @@ def test_copies_count_once(name):
     np.testing.assert_array_equal(doubled.vertex_of_point, np.repeat(single.vertex_of_point, 2))
 
 
-@pytest.mark.parametrize("case", ["a tenth twice", "all three times, shuffled", "forty times in one place"])
-def test_copies_of_some_points_count_once(case):
-    """Of a body with a surface, of a crown whose parts are traced, and of noise."""
-    rng = np.random.default_rng(0)
-    for cloud in (samples.sauropod(2500).points, samples.tree(3000).points, samples.torus(9000, noise=0.04).points):
-        n = len(cloud)
-        copies = {
-            "a tenth twice": rng.permutation(n)[: n // 10],
-            "all three times, shuffled": rng.permutation(np.repeat(np.arange(n), 2)),
-            "forty times in one place": np.repeat(rng.permutation(n)[:50], 40),
-        }[case]
-        order = rng.permutation(n + len(copies))
-        assert_equal_curves(run(np.concatenate([cloud, cloud[copies]])[order], "default"), run(cloud, "default"))
-
-
 @pytest.mark.parametrize("apart", [1e-15, 1e-11, 1e-8])
 def test_what_is_a_copy_is_said_by_the_spacing(apart):
     """Copies moved by much less than the points are apart; and a small object beside a large one is none."""

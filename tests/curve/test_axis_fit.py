@@ -57,9 +57,6 @@ def off_axis(vertices):
     return np.hypot(vertices[:, 1], vertices[:, 2])
 
 
-# ---- closed forms
-
-
 @pytest.mark.parametrize("off", [(0, 0.12), (0.05, 0.1), (0.2, -0.2)])
 def test_a_curve_anywhere_comes_to_the_axis_of_a_tube(off):
     distance = [off_axis(fit_axis(tube(off), passes)[0]).max() for passes in range(5)]
@@ -102,9 +99,6 @@ def test_a_polygon_comes_to_the_centre_circle_of_a_torus():
     assert np.abs((turn + np.pi) % (2 * np.pi) - np.pi).max() < 1e-3
 
 
-# ---- flat sections
-
-
 def strip(wide=0.3, thick=0.06, wiggle=0.0, n=6000, seed=0):
     """A bar along x with a rectangular section of these half axes, and a curve that winds over its width."""
     rng = np.random.default_rng(seed)
@@ -133,26 +127,6 @@ def test_the_sides_say_where_the_middle_is_if_half_of_the_faces_belongs_to_anoth
     assert np.abs(fit_axis(half, 6, settle=True)[0][4:-4, 1]).max() < 0.1 * 0.3
 
 
-def test_the_section_of_a_flat_bar_is_its_own_and_its_width_is_doubt():
-    wide, thick = 0.3, 0.06
-    fitted = axis_fit.fit_axis(Curve.of(strip(wide, thick)), 3)
-    sections = fitted.sections
-    np.testing.assert_allclose(sections.half_width[4:-4], wide, rtol=0.02)
-    np.testing.assert_allclose(sections.half_thickness[4:-4], thick, rtol=0.02)
-    # mean squares over the section, of what the normals do not explain and of the distance
-    face, side = wide / (wide + thick), thick / (wide + thick)
-    miss = (face * wide**2 + side * thick**2) / 3
-    apart = face * (wide**2 / 3 + thick**2) + side * (wide**2 + thick**2 / 3)
-    sure = 1 - min(2 * miss / apart, 1)
-    count = 6000 / 40 * 3  # the points of three vertices
-    assert fitted.confidence[4:-4].mean() == pytest.approx(sure * count / (count + HALF_SUPPORT), abs=0.02)
-    # the radius is that of the area, and up to a half more in places: a part of the width counts as noise
-    ratio = fitted.radii[4:-4] / np.sqrt(wide * thick)
-    assert ratio.min() > 0.95
-    assert 0.99 < ratio.mean() < 1.25
-    assert ratio.max() < 1.5
-
-
 @pytest.mark.parametrize(("noise", "known"), [(0.3, False), (1.0, False), (1.0, True)])
 def test_where_noise_is_the_curve_is_smooth_and_near_the_axis(noise, known):
     """The noise is up to a radius wide, and its normals may point anywhere."""
@@ -166,9 +140,6 @@ def test_where_noise_is_the_curve_is_smooth_and_near_the_axis(noise, known):
     assert off_axis(moved).mean() < 0.25 * R
     # across the axis, not along it: it is as long as it was
     assert np.ptp(moved[:, 0]) == pytest.approx(2 * 0.95, rel=0.05)
-
-
-# ---- confidence
 
 
 @pytest.mark.parametrize("height", [0, 0.05, R, 0.4])
@@ -198,17 +169,6 @@ def test_a_bar_has_two_sides_and_a_sheet_one(case, low, high):
         assert sure > 0.5 + np.median(fit_axis(bar, 2)[1])
 
 
-# ---- what does not matter, and what is not there
-
-
-@pytest.mark.parametrize(("scale", "shift"), [(1, [1e4, -3, 7]), (1e-9, 0), (1e12, 3e12)])
-def test_goes_with_the_cloud(scale, shift, placed):
-    moved, turn = placed(torus(), scale=scale, shift=shift)
-    (vertices, confidence, _), (expected, sure, _) = fit_axis(moved, 3), fit_axis(torus(), 3)
-    np.testing.assert_allclose((vertices - shift) / scale, expected @ turn, atol=1e-8)
-    np.testing.assert_allclose(confidence, sure, atol=1e-7)
-
-
 def test_points_without_a_normal_or_a_vertex_have_no_say():
     raw, rest = torus(), slice(700, None)
     normals, vertex, points = raw.normals.copy(), raw.vertex_of_point.copy(), raw.points.copy()
@@ -236,9 +196,6 @@ def test_vertices_between_points_bridge_them():
     assert confidence[~middle].max() > 0.9
 
 
-# ---- vertices far from their points
-
-
 @settings(max_examples=60)
 @given(st.integers(0, 10**6), st.integers(1, 8), st.booleans())
 def test_detached_vertices_are_pulled_back_to_the_reach_of_half_a_tube(random_skeleton, seed, m, every):
@@ -256,9 +213,6 @@ def test_detached_vertices_are_pulled_back_to_the_reach_of_half_a_tube(random_sk
         reach = HALF_TUBE_REACH * np.sqrt(((own - mean) ** 2).sum(axis=1).mean())
         away = np.linalg.norm(before - mean)
         np.testing.assert_allclose(after, mean + (before - mean) * min(1, reach / max(away, 1e-300)), atol=1e-12)
-
-
-# ---- radii
 
 
 def test_radii_of_a_cone_are_those_of_the_balls_in_it():

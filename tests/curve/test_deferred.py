@@ -102,33 +102,6 @@ def test_nothing_may_be_left(monkeypatch):
     assert Tracer()(refined).report.n_traced == len(lines.points)
 
 
-@pytest.mark.parametrize("recentre", [0, 1])
-@pytest.mark.parametrize("edges", [[], [(576, 577)]], ids=["no edges", "no normals"])
-def test_of_what_is_left_nothing_may_be_asked(monkeypatch, recentre, edges):
-    """A vertex that is sure and has no edge, or an edge whose points have no normals."""
-    lines, found, rng = comb(), seen(monkeypatch), np.random.default_rng(0)
-    turn, up = 2 * np.pi * rng.random(1500), rng.random(1500)
-    normals = np.column_stack([np.cos(turn), np.sin(turn), 0 * turn])
-    points = 30 + normals + up[:, None] * [0, 0, 4]
-    more = 2
-    whole = replace(
-        lines,
-        vertices=np.concatenate([lines.vertices, np.full((more, 3), 30.0) + [[0, 0, 1], [0, 0, 3]]]),
-        edges=np.concatenate([lines.edges, np.reshape(edges, (-1, 2)).astype(int)]),
-        points=np.concatenate([lines.points, points]),
-        normals=np.concatenate([lines.normals, np.where(len(edges), np.nan, normals)]),
-        vertex_of_point=np.concatenate([lines.vertex_of_point, 576 + (up > 0.5)]),
-        **{name: np.append(getattr(lines, name), [0.1] * more) for name in ("radii", "half_width", "half_thickness")},
-        confidence=np.append(lines.confidence, [1.0] * more),
-        support=np.full(578, np.nan),
-    )
-    refined = Refiner(recentre=recentre)(whole)
-    assert np.isfinite(refined.vertices).all()
-    assert refined.n_components >= 2
-    if not recentre:
-        assert found[0].gone.sum() == 576
-
-
 def test_points_without_a_vertex_have_none_afterwards():
     lines = comb()
     owner = np.where(np.arange(len(lines.points)) % 7, lines.vertex_of_point, -1)

@@ -1,14 +1,10 @@
 """Ends go on along their limbs and stop where these do."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton, samples, skeletonize
-from glsk_o3d.curve.curve import Curve
-from glsk_o3d.curve.shape.ends import regrow_ends
 
 R = 0.1
 LENGTH = 1.2
@@ -64,24 +60,6 @@ def test_an_end_stops_where_its_limb_does(refine, cap, where, stop, hook):
     np.testing.assert_allclose(found, [LENGTH + where * R, 0, 0], atol=0.15 * R)
 
 
-@pytest.mark.parametrize("beside", [0, 8])
-def test_an_end_bent_into_a_corner_where_others_have_the_points_is_straightened(beside):
-    """The last radius of the curve turns aside, and owns next to nothing: only what is behind it knows of the limb."""
-    points, normals = limb("flat")
-    straight, k = fork(points, normals, LENGTH - R / 2), 12
-    m, end = len(straight.vertices), len(straight.vertices) - 3
-    aside = np.linspace(0, R, k + 1)[1:, None] * [0.2, 1, 0] + straight.vertices[end]
-    edges = [*straight.edges.tolist(), [end, m], *([i, i + 1] for i in range(m, m + k - 1))]
-    owner = straight.vertex_of_point.copy()
-    owner[np.argsort(np.linalg.norm(points - aside[-1], axis=1))[:beside]] = m + k - 1
-    radii = np.where(np.arange(m + k) < m, R, R / 20)
-    bent = Skeleton(np.concatenate([straight.vertices, aside]), sorted(edges), radii, owner, points, normals)
-    grown = regrow_ends(Curve.of(bent))
-    np.testing.assert_allclose(tip(grown), [LENGTH - R / 2, 0, 0], atol=0.2 * R)
-    limbs = grown.vertices[np.abs(grown.vertices[:, 1]) < 1]
-    assert np.abs(limbs[:, 1:]).max() < 0.2 * R
-
-
 def bottle(thin, long, n=6000):
     """A tube of radius R with a neck of that radius and length, and faces at its shoulder and at the end."""
     rng = np.random.default_rng(0)
@@ -124,22 +102,3 @@ def test_a_head_that_hangs_from_its_neck_has_an_axis(n, seed):
     nose = body.nodes[np.argmax(body.nodes[:, 0])]
     away = np.linalg.norm(skeleton.vertices[skeleton.leaves] - nose, axis=1)
     assert away.min() < 0.035  # .75 radii there
-
-
-@pytest.mark.parametrize(("reach", "stays"), [(0.8, True), (0.3, False)])
-def test_an_end_that_does_not_leave_its_body_stays(reach, stays):
-    """The run behind it lies in the body, of which the junction's points are the surface, and leads nowhere."""
-    points, normals = limb("round")
-    out = points[:, 0] > 0.3
-    skeleton = fork(points[out], normals[out], 0.6, hook=R)
-    body = np.random.default_rng(0).normal(size=(200, 3))
-    body *= reach / np.linalg.norm(body, axis=1, keepdims=True)
-    owner = np.concatenate([skeleton.vertex_of_point, np.zeros(len(body), int)])
-    with_body = replace(
-        skeleton,
-        points=np.concatenate([skeleton.points, body]),
-        normals=np.concatenate([skeleton.normals, body / reach]),
-        vertex_of_point=owner,
-    )
-    grown = regrow_ends(Curve.of(with_body))
-    assert np.array_equal(grown.vertices, with_body.vertices) == stays

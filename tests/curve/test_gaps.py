@@ -43,16 +43,6 @@ def test_joins_of_a_tree_come_behind_bridges():
     assert lengths[0] < 1 < 2.5 < lengths[1]
 
 
-def test_paths_that_meet_are_told():
-    """Around a ring of points two shortest paths run into each other."""
-    turn = 2 * np.pi * (np.arange(400) + 0.3 * np.random.default_rng(3).random(400)) / 400
-    ring = pipelines.default()(np.column_stack([np.cos(turn), np.sin(turn), 0 * turn]))
-    assert ring.n_loops == 1
-    gap = gap_of(ring)
-    assert np.linalg.norm(gap[1] - gap[0]) < 0.2
-    np.testing.assert_allclose(np.linalg.norm(gap, axis=1), 1, atol=0.01)
-
-
 def test_a_handle_leads_through_an_empty_bowl():
     """The curve of a mug goes on from where its handle meets the wall to the middle, from which all points are far."""
     rng, n = np.random.default_rng(0), 30000
@@ -71,11 +61,6 @@ def test_a_handle_leads_through_an_empty_bowl():
     np.testing.assert_allclose(gaps[0, 0], gaps[1, 0])  # the middle
     assert np.hypot(*gaps[0, 0, :2]) < 0.2
     np.testing.assert_allclose(np.hypot(*gaps[:, 1, :2].T), 0.4, atol=0.1)
-
-
-def test_gaps_have_the_unit_of_their_skeleton():
-    curve = Curve.of(Skeleton(np.eye(3), [(0, 1)], np.ones(3), (), (), ())).with_gaps(np.ones((1, 2, 3)))
-    assert curve.scaled(0.25).report.joined == (((0.25,) * 3, (0.25,) * 3),)
 
 
 @pytest.mark.parametrize("size", [0.003, 0.03])

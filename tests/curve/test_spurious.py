@@ -60,9 +60,3 @@ def test_what_has_a_surface_stays_and_so_does_the_root():
     assert drop(sure) is sure
     assert drop(short, root=42) is short
     assert drop(short, root=41) is short  # inside the twig
-
-
-def test_the_root_stays_the_root_when_others_before_it_go():
-    left = drop(limb((20, SCATTER), (20, -1.2 * SCATTER), (20, 1.5 * SCATTER)), root=46)
-    assert len(left.leaves) == 3
-    assert left.vertices[:, 1].max() == 1.5 * SCATTER

@@ -1,7 +1,6 @@
 """Loops, limbs, branches that cross air, and gaps: what the surface says of them in closed cases, and the engine."""
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
@@ -38,9 +37,6 @@ def assert_unchanged(skeleton, raw):
 def oriented(skeleton):
     curve = Curve.of(skeleton)
     return Evidence(curve, Surface.of(curve).oriented(curve))
-
-
-# ---- loops
 
 
 @SIDES
@@ -206,9 +202,6 @@ def test_every_closed_loop_is_counted_once(seed):
     assert all((each.probability < 0.5) == each.changed for each in decisions)
 
 
-# ---- limbs
-
-
 def test_limbs_do_not_depend_on_how_the_object_is_turned(refine, placed):
     """Nor on the order of the points, of which some are taken to say how far a branch stands out."""
     raw = (pipelines.rings() | Contractor() | Connector())(samples.sauropod(3000).points)
@@ -273,27 +266,6 @@ def test_what_ends_nowhere_is_no_spur(piped, refine):
         assert_unchanged(refine(raw, limb=0.25), raw)
 
 
-def test_of_a_fork_of_short_limbs_the_better_two_stay(piped, refine):
-    """They are one path."""
-    raw = piped([[(0, 0, 0), (0.1, 0, 0)], [(0, 0, 0), (-0.05, 0.12, 0)], [(0, 0, 0), (-0.05, -0.14, 0)]])
-    assert counts(refine(raw, limb=1.0)) == (1, 0, 2)
-
-
-def test_a_stout_body_keeps_its_short_legs():
-    """Which leave it by one to two of their own diameters."""
-    body, middle = np.array([[-0.5, 0, 0], [0.5, 0, 0]]), np.array([[-0.35, 0, 0], [0.35, 0, 0]])
-    edges, right = np.array([[0, 1], [2, 4], [3, 5], [2, 6], [3, 7]]), []
-    for (reach, thick), seed in product([(0.25, 0.1), (0.4, 0.14), (0.6, 0.18)], range(4)):
-        feet = [middle + [0, side, thick - 0.35 - reach] for side in (-0.2, 0.2)]
-        nodes, radii = np.concatenate([body, middle, *feet]), np.repeat([0.35, thick], [2, 6])
-        cow = union_sample("", nodes, edges, radii, 4096, 0.0, seed)
-        right.append(counts(skeletonize(cow.points)) == (1, 0, 6))
-    assert sum(right) >= 11  # of 12
-
-
-# ---- branches that cross air
-
-
 @pytest.mark.parametrize("noise", [0.0, 0.5])
 def test_an_edge_between_two_tubes_is_cut(piped, refine, noise):
     raw = replace(piped(ACROSS, ACROSS[:2]), report=Report(noise=noise))
@@ -316,8 +288,6 @@ def test_limbs_and_struts_are_kept(piped, refine, lines, side):
     assert len(skeleton.report.decisions) == len(raw.branches)
     assert max(it.probability for it in skeleton.report.decisions) < 0.25
 
-
-# ---- gaps
 
 ARC = [[(np.cos(t), np.sin(t), 0) for t in np.linspace(0.15, 2 * np.pi - 0.15, 30)]]
 PARTS = [[(-1, 0, 0), (-0.15, 0, 0)], [(0.15, 0, 0), (1, 0, 0)]]
@@ -381,9 +351,6 @@ def test_every_end_is_joined_once(piped, refine):
     assert skeleton.degree.max() <= 3
     joined = [sorted(skeleton.vertices[e, 0].tolist()) for e in skeleton.edges if skeleton.edge_lengths.max() > 0.2]
     assert [-0.15, 0.15] in joined
-
-
-# ---- the engine
 
 
 class RightEnds(Question):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import glsk_o3d as glsk
-from glsk_o3d import InvalidParameterError, Tracer, pipelines, samples
+from glsk_o3d import InvalidParameterError, Tracer, pipelines
 from glsk_o3d.analysis import branch_table
 
 RNG = np.random.default_rng(3)
@@ -86,12 +86,6 @@ def test_roots(sparse, root, place):
     assert (skeleton.n_components, skeleton.n_loops) == (1, 0)
 
 
-@pytest.mark.slow
-def test_the_thickest_end_of_a_sparse_tree_is_that_of_the_trunk():
-    skeleton = pipelines.tree("thickest")(samples.tree(2048, forks=5).points)
-    assert np.linalg.norm(skeleton.vertices[0]) < 0.15
-
-
 @pytest.mark.parametrize("root", ["up", "1,2", "1,2,nan", 3, (1, 2), ("a", "b", "c"), [[1], [2, 3], 4]])
 def test_no_root(root):
     with pytest.raises(InvalidParameterError, match="a point such as"):
@@ -131,17 +125,9 @@ def test_a_trunk_with_a_surface_stays_what_it_was():
     assert kept == {tuple(place) for place in skeleton.vertices[trunk].tolist()}
 
 
-@pytest.mark.parametrize(
-    "cloud",
-    [
-        samples.torus(2000).points,
-        samples.y_junction(600).points,
-        np.column_stack([RNG.random((2000, 2)), np.zeros(2000)]),
-        RNG.random((2000, 3)),
-    ],
-    ids=["torus", "y", "sheet", "filled"],
-)
-def test_surfaces_sheets_and_clouds_are_not_traced(cloud):
+@pytest.mark.parametrize("thick", [0, 1])
+def test_sheets_and_clouds_are_not_traced(thick):
+    cloud = np.random.default_rng(3).random((2000, 3)) * [1, 1, thick]
     assert pipelines.default()(cloud).report.n_traced == 0
 
 

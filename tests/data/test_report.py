@@ -69,15 +69,6 @@ def test_print_says_the_main_things_in_about_ten_lines():
     assert eval(repr(report.decisions)) == report.decisions
 
 
-@pytest.mark.parametrize(
-    ("counts", "sampled"),
-    [((0, 0, 0), False), ((10, 0, 10), False), ((10, 2, 8), False), ((10, 0, 0), False), ((10, 0, 4), True)],
-)
-def test_sampled_only_where_a_cloud_was_large(counts, sampled):
-    n, dropped, kept = counts
-    assert Report(n_input=n, n_dropped=dropped, n_sampled=kept).is_sampled is sampled
-
-
 @dataclass(frozen=True, kw_only=True)
 class Doubt(Filter[Contraction, Contraction]):
     """A filter of somebody else's that warns."""

@@ -18,7 +18,6 @@ from glsk_o3d import (
 )
 from glsk_o3d.data.decisions import Decision
 from glsk_o3d.data.skeleton import Skeleton
-from glsk_o3d.samples import torus, y_junction
 from glsk_o3d.samples.capsules import union_sample
 
 
@@ -81,18 +80,6 @@ def test_all_and_none_and_back(seed):
     assert kept >= {it.place for it in judged if it.probability >= 0.75}
 
 
-def test_without_radii_nothing_comes_back():
-    """Nobody knows then what was near."""
-    turn = np.linspace(0, 2 * np.pi, 9)[:-1]
-    ring = Skeleton(
-        np.column_stack([np.cos(turn), np.sin(turn), 0 * turn]), [(k, (k + 1) % 8) for k in range(8)], (), (), (), ()
-    )
-    curve = ((1.0, 0.01, 0.0), (2.0, 0.0, 0.0))
-    gone = Decision("limb", curve[-1], 0.2, True, curve, (0.1, 0.1))
-    given = replace(ring, report=replace(ring.report, decisions=(gone,)))
-    assert editing.detailed(given, limb=0) is given
-
-
 def test_a_root_stays():
     tree = pipelines.tree()(samples.tree(4000, forks=3).points)
     bare = editing.detailed(tree, limb=1)
@@ -140,15 +127,6 @@ def test_files_keep_it(stout, tmp_path):
         read = read_skeleton(tmp_path / name)
         assert read.report.decisions == stout.report.decisions
         assert same(editing.detailed(read, limb=0), editing.detailed(stout, limb=0))
-
-
-def test_what_nobody_asked_about_stays():
-    ring, junction = skeletonize(torus(1000).points), skeletonize(y_junction(1500).points)
-    assert same(editing.detailed(ring, limb=1), ring)
-    unasked = skeletonize(y_junction(1500).points, limb=0)
-    for skeleton in (unasked, replace(junction, report=replace(junction.report, decisions=()))):
-        for limb in (0, 1):
-            assert same(editing.detailed(skeleton, limb=limb), skeleton)
 
 
 @pytest.mark.parametrize("limb", [-0.1, 1.5, np.nan, "much"])

@@ -6,9 +6,8 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 
-from glsk_o3d import Contractor, LPRReducer, Pipeline, RingBuilder, Sampler, pipelines, samples
+from glsk_o3d import Contractor, LPRReducer, Pipeline, RingBuilder, pipelines, samples
 from glsk_o3d.filters import contractor as module
 from glsk_o3d.filters.contractor import explained_score
 from glsk_o3d.geometry.cotangent import cotangent_laplacian
@@ -26,9 +25,6 @@ def built():
 
 def never(_):
     """A stopping rule."""
-
-
-# ---- one solve
 
 
 def test_first_solve_is_the_least_squares_solution(built):
@@ -72,26 +68,6 @@ def test_going_on_is_the_same_as_not_having_stopped(built):
         assert [record.iteration for record in through.report.iterations] == [1, 2, 3, 4]
 
 
-# ---- closed forms
-
-
-def distance_to_axis(points, sample):
-    """In tube radii."""
-    share = np.linspace(0, 1, 41)[:, None, None]
-    a, b = sample.nodes[sample.edges[:, 0]], sample.nodes[sample.edges[:, 1]]
-    return cKDTree((a + share * (b - a)).reshape(-1, 3)).query(points)[0] / sample.radii.mean()
-
-
-@pytest.mark.slow
-def test_conserving_mass_keeps_a_torus_open():
-    """Without it the torus falls into its centre: the reason for the multiplicities."""
-    sample = samples.torus(n=2048, seed=1)
-    built = (Sampler(frame="box") | RingBuilder(k=16))(sample.points)
-    kept, lost = (distance_to_axis(filter(built).contracted, sample).mean() for filter in (DEFAULT, WEN))
-    assert kept < 0.4
-    assert lost > 1.5
-
-
 @pytest.mark.parametrize(
     ("points", "score"),
     [
@@ -105,9 +81,6 @@ def test_explained_score(points, score):
     turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
     for moved in (points, 1e-3 * points @ turn - 5):
         assert explained_score(moved) == pytest.approx(score, abs=1e-9)
-
-
-# ---- records, stopping, reducing
 
 
 def test_records_follow_their_definitions(built):
@@ -148,9 +121,6 @@ def test_the_stopping_rule_is_asked_after_every_solve_and_its_reason_kept(built)
     assert (len(told), state.report.stop_reason, state.report.converged) == (2, "stopped by the caller", False)
     assert tuple(told) == state.report.iterations
     np.testing.assert_array_equal(state.positions, Contractor(stop=never, max_iterations=2)(built).positions)
-
-
-# ---- the guards
 
 
 def same(a, b, rounding=0.0):
@@ -202,9 +172,6 @@ def test_unsolvable_system_keeps_the_last_sound_state(built, monkeypatch, fails_
     assert not state.report.converged
 
 
-# ---- weights, and points held
-
-
 @pytest.fixture
 def weights(monkeypatch):
     """The weights that are solved with; of some points, thrown out unless they are held, one at a time."""
@@ -229,9 +196,6 @@ def test_thrown_points_are_held(built, weights):
         np.testing.assert_array_equal(weight, np.where(np.isin(np.arange(400), [7, 3, 250][:attempt]), 1e4, 1))
     assert len(weights.seen) == 4
     np.testing.assert_allclose(state.positions[[7, 3, 250]], built.positions[[7, 3, 250]], atol=1e-4)
-
-
-# ---- what is a line already
 
 
 def test_lines_are_held_from_the_second_solve_on(built, weights, monkeypatch):

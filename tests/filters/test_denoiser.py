@@ -21,9 +21,6 @@ def thread(noise=0.2, n=400):
     return np.column_stack([x, 0 * x, 0 * x]) + noise * rng.normal(size=(n, 3))
 
 
-# ---- how far they are noise
-
-
 @settings(max_examples=30)
 @given(st.integers(0, 10**6), st.integers(1, 30), st.integers(1, 9))
 def test_noise_share_by_its_definition(seed, n, k):
@@ -34,9 +31,6 @@ def test_noise_share_by_its_definition(seed, n, k):
     middle = np.array([np.median([ratio[j] for j in row]) for row in neighbours])
     expected = np.interp(middle, [0.2, 0.35], [0, 1])
     np.testing.assert_allclose(noise_share(spread, neighbours), expected, atol=1e-12)
-
-
-# ---- subspace-constrained mean shift
 
 
 @pytest.mark.parametrize("share", [1, 0.25])
@@ -52,9 +46,6 @@ def test_one_pass_by_its_definition(share):
         way = np.average(near, axis=0, weights=weight) - x
         along = np.linalg.eigh(np.cov(near, rowvar=False, aweights=weight))[1][:, 2]
         np.testing.assert_allclose(after, x + share * (way - along * (along @ way)), atol=1e-10)
-
-
-# ---- the filter
 
 
 def in_order(points):
@@ -81,9 +72,6 @@ def test_clean_clouds_are_not_denoised(points):
     plain, denoised = Sampler()(points), (Sampler() | Denoiser(denoise=9))(points)
     np.testing.assert_array_equal(denoised.cloud, plain.cloud)
     np.testing.assert_array_equal(denoised.neighbours, plain.neighbours)
-
-
-# ---- averaging where noise is wider than neighbourhoods
 
 
 @pytest.mark.slow

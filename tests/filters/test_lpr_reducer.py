@@ -44,9 +44,6 @@ def test_runs_alone_as_a_filter_after_a_contraction():
     assert reduced.report.stages == tuple(map(repr, pipeline.stages))
 
 
-# ---- the energy
-
-
 def slow_energy(state):
     """Equations 6 to 12, point by point."""
     psi = 1.2 * state.ring_ratio_drop
@@ -67,9 +64,6 @@ def test_energy_against_the_equations(state):
         np.testing.assert_allclose(merge_energy(case), slow_energy(case), rtol=1e-9)
 
 
-# ---- the matching
-
-
 @settings(max_examples=100)
 @given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, 9)).filter(lambda pair: pair[0] != pair[1]), max_size=25))
 def test_matching_is_greedy(pairs):
@@ -83,9 +77,6 @@ def test_matching_is_greedy(pairs):
         else:
             assert taken & set(pair)  # and nothing that came before in the order was left out
     assert chosen == sorted(chosen)
-
-
-# ---- the pass
 
 
 @pytest.mark.parametrize("reducer", VARIANTS, ids=repr)
@@ -120,13 +111,3 @@ def test_bookkeeping_of_a_pass(state, reducer):
     np.testing.assert_array_equal(after.ring_size0, s0)
     np.testing.assert_array_equal(after.ring_size, s)
     assert (after.rings.indices != after.rings.centres).all()  # nobody surrounds itself
-
-
-@pytest.mark.parametrize("reducer", VARIANTS, ids=repr)
-def test_cheapest_first_does_not_depend_on_the_order_of_the_points(reducer):
-    """By index does, as in the published code."""
-    points = CLOUDS["torus"]
-    order = np.random.default_rng(0).permutation(len(points))
-    straight, shuffled = (reducer(contracted(cloud)) for cloud in (points, points[order]))
-    same = set(straight.point_of_survivor.tolist()) == set(order[shuffled.point_of_survivor].tolist())
-    assert same == (reducer.order == "cheapest")

@@ -59,9 +59,6 @@ def test_it_does_not_matter_how_the_cloud_lies():
     np.testing.assert_array_equal(np.sort(order[left(points[order])]), kept)
 
 
-# ---- the filter
-
-
 TORUS = samples.torus(n=600).points
 ALL, STRICT = Sampler(), Sampler() | OutlierRemover()
 
@@ -98,9 +95,6 @@ def test_what_is_left_is_the_cloud_without_them(outliers):
     np.testing.assert_array_equal(state.representative_of_point[~kept], clean.representative_of_point[nearest])
 
 
-# ---- mixed pixels of a depth camera
-
-
 def veiled(points, share, seed=0, reach=0.3, across=0.01):
     """A cloud seen from above, and after it mixed pixels: a veil below its outline, down to the ground."""
     rng = np.random.default_rng(seed)
@@ -121,13 +115,6 @@ def test_a_veil_of_mixed_pixels_goes(share):
     assert state.report.n_mixed > 0
     assert state.outlier[4000:].mean() > 0.85
     assert state.outlier[:4000].mean() < 0.01
-
-
-def test_a_few_mixed_pixels_are_asked_for_by_their_neighbours_alone():
-    points = veiled(RING, 0.004)
-    state = STRICT(points)
-    assert state.report.n_mixed == 0
-    assert not state.outlier[:4000].any()
 
 
 def test_twigs_and_noise_are_no_mixed_pixels():

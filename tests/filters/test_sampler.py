@@ -61,8 +61,6 @@ def test_a_large_cloud_is_sampled_and_every_point_has_its_place():
     np.testing.assert_array_equal(np.isfinite(skeleton.normals[:, 0]), state.sampled)
 
 
-# ---- meshes
-
 CORNERS = np.array([[0, 0, 0], [0, 0, 20], [15, 0, 20], [15, 12, 20.0]])
 """The axis of a pipe of three straight pieces, 47 long."""
 

@@ -50,9 +50,6 @@ def test_nearest_pairs_go_first():
         assert (into[merged:10] == np.arange(merged, 10)).all()
 
 
-# ---- where there are more than enough
-
-
 def evened(points, around):
     neighbours = nearest_neighbours(points, 16)[1]
     apart = spacing_enough(points, neighbours, principal(points, neighbours)[0], around)
@@ -76,15 +73,6 @@ def test_dense_tubes_are_merged_as_far_as_allowed_and_sparse_ones_stay(noise):
         else:
             assert len(left(into)) > 0.7 * n
             assert (np.linalg.norm(points - points[into], axis=1) < spacing).all()
-
-
-def test_a_plane_has_its_share_of_the_points_that_are_enough():
-    """No part of it is thin, so that only their number says how far apart they may be."""
-    points = np.column_stack([np.random.default_rng(0).uniform(0, 1, (9000, 2)), np.zeros(9000)])
-    assert len(left(evened(points, 20)[0])) == pytest.approx(2400, rel=0.1)
-
-
-# ---- the filter
 
 
 @pytest.mark.parametrize(
