@@ -9,8 +9,11 @@ from glsk_o3d import Connector, Contractor, Report, pipelines, samples, skeleton
 from glsk_o3d.curve.curve import Curve
 from glsk_o3d.curve.merging import collapse_triangles, drop_edges, drop_vertices
 from glsk_o3d.curve.surface import Evidence, Surface
+from glsk_o3d.curve.topology.false_branches import FalseBranches
+from glsk_o3d.curve.topology.gaps import Gaps
 from glsk_o3d.curve.topology.loops import Loops
 from glsk_o3d.curve.topology.question import Candidate, Question, ask
+from glsk_o3d.curve.topology.spurs import Limbs
 from glsk_o3d.data.decisions import logistic
 from glsk_o3d.samples.capsules import union_sample
 
@@ -351,6 +354,37 @@ def test_every_end_is_joined_once(piped, refine):
     assert skeleton.degree.max() <= 3
     joined = [sorted(skeleton.vertices[e, 0].tolist()) for e in skeleton.edges if skeleton.edge_lengths.max() > 0.2]
     assert [-0.15, 0.15] in joined
+
+
+CASES = {
+    "a ladder": (Loops, lambda piped: piped(LADDER), [5.58, 5.57]),
+    "strands": (Loops, lambda piped: strands(piped, 0.16, 1.5, side=Z + 0.3 * Y), [-6.32]),
+    "a stub": (Limbs, lambda piped: surely(twig(piped, 0.8)), [5.11, -3.81, 4.95]),
+    "a limb in a tube": (Limbs, lambda piped: surely(twig(piped, 3, TUBE)), [5.11, -4.4, 5.05]),
+    "a false branch": (
+        FalseBranches,
+        lambda piped: replace(piped(ACROSS, ACROSS[:2]), report=Report(noise=0.5)),
+        [-7.64, -7.48, 3.39, -7.43, -7.61],
+    ),
+    "a strut": (FalseBranches, lambda piped: piped(ACROSS), [-8.52, -8.32, -5.81, -8.13, -8.32]),
+    "a ring": (FalseBranches, lambda piped: piped(TORUS), [-6.73]),
+    "a gap in a ring": (Gaps, lambda piped: piped(ARC), [1.3]),
+    "capsules": (Gaps, lambda piped: capped(piped(PARTS), (-0.15 * X, X), (0.15 * X, -X)), [-1.69]),
+}
+"""Questions about hand-made cases, and the log-odds that the fitted models give."""
+
+
+def surely(skeleton):
+    """With a confidence that differs from vertex to vertex."""
+    return replace(skeleton, confidence=0.5 + 0.4 * np.sin(np.arange(len(skeleton.vertices))))
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_hand_made_cases_are_judged_as_they_were_when_the_models_were_fitted(piped, case):
+    question, make, recorded = CASES[case]
+    found = sorted(question().candidates(oriented(make(piped)), 0.5), key=lambda each: each.place.round(2).tolist())
+    probability = np.array([each.probability for each in found])
+    np.testing.assert_allclose(np.log(probability / (1 - probability)), recorded, atol=0.02)
 
 
 class RightEnds(Question):
