@@ -49,7 +49,7 @@ def test_a_twig_must_leave_the_scatter_of_its_limb(confidence, length, stays):
 
 
 def test_many_at_one_fork_go_one_after_another():
-    left = drop(limb((20, SCATTER), (20, -1.5 * SCATTER), (20, 2 * SCATTER), (30, 9 * SCATTER)))
+    left = drop(limb((20, SCATTER), (20, -1.5 * SCATTER), (20, 2 * SCATTER), (30, 4 * SCATTER)))
     assert len(left.leaves) == 3
     np.testing.assert_array_equal(left.vertices[:41], limb().vertices)
 
