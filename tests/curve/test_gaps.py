@@ -43,26 +43,6 @@ def test_joins_of_a_tree_come_behind_bridges():
     assert lengths[0] < 1 < 2.5 < lengths[1]
 
 
-def test_a_handle_leads_through_an_empty_bowl():
-    """The curve of a mug goes on from where its handle meets the wall to the middle, from which all points are far."""
-    rng, n = np.random.default_rng(0), 30000
-    turn, high = rng.uniform(-np.pi, np.pi, n), rng.uniform(-0.5, 0.5, n)
-    wall = np.column_stack([0.4 * np.cos(turn), 0.4 * np.sin(turn), high])
-    around, along = rng.uniform(-np.pi, np.pi, n), rng.uniform(-np.pi / 2, np.pi / 2, n)
-    out = 0.3 + 0.06 * np.cos(around)
-    handle = np.column_stack([0.38 + out * np.cos(along), 0.06 * np.sin(around), out * np.sin(along)])
-    handle = handle[np.hypot(*handle[:, :2].T) > 0.4][: n // 6]
-    floor = np.column_stack([rng.uniform(-0.4, 0.4, (n // 4, 2)), np.full(n // 4, -0.5)])
-    points = np.concatenate([wall, handle, floor[np.hypot(*floor[:, :2].T) < 0.4]])
-    skeleton = pipelines.default()(points[rng.permutation(len(points))[:4096]])
-    assert skeleton.n_loops == 1
-    gaps = np.array(skeleton.report.joined)
-    assert gaps.shape == (2, 2, 3)
-    np.testing.assert_allclose(gaps[0, 0], gaps[1, 0])  # the middle
-    assert np.hypot(*gaps[0, 0, :2]) < 0.2
-    np.testing.assert_allclose(np.hypot(*gaps[:, 1, :2].T), 0.4, atol=0.1)
-
-
 @pytest.mark.parametrize("size", [0.003, 0.03])
 @pytest.mark.parametrize("n", [40, 60])
 def test_a_few_flying_points_are_no_part(n, size):

@@ -83,6 +83,12 @@ def test_the_curve_of_a_cup_leaves_its_body_in_the_handle_only(seed, lid):
     off = np.hypot(np.hypot(x - 0.38, z) - 0.3, y)[outside] / HANDLE
     assert off.max() < 0.8
     assert off.mean() < 0.2
+    if not lid:  # from the wall it leads to the middle, from which all points are far
+        gaps = np.array(skeleton.report.joined)
+        assert gaps.shape == (2, 2, 3)
+        np.testing.assert_allclose(gaps[0, 0], gaps[1, 0])
+        assert np.hypot(*gaps[0, 0, :2]) < 0.2
+        np.testing.assert_allclose(np.hypot(*gaps[:, 1, :2].T), BODY, atol=0.1)
 
 
 @pytest.mark.parametrize("seed", range(2))

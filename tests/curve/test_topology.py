@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glsk_o3d import Connector, Contractor, Report, pipelines, samples, skeletonize
+from glsk_o3d import Connector, Contractor, Report, pipelines, skeletonize
 from glsk_o3d.curve.curve import Curve
 from glsk_o3d.curve.merging import collapse_triangles, drop_edges, drop_vertices
 from glsk_o3d.curve.surface import Evidence, Surface
@@ -203,17 +203,6 @@ def test_every_closed_loop_is_counted_once(seed):
     assert len(decisions) - len(changed) == closed.n_loops
     assert 0 < len(changed) == len(set(changed)) <= raw.n_loops - closed.n_loops
     assert all((each.probability < 0.5) == each.changed for each in decisions)
-
-
-def test_limbs_do_not_depend_on_how_the_object_is_turned(refine, placed):
-    """Nor on the order of the points, of which some are taken to say how far a branch stands out."""
-    raw = (pipelines.rings() | Contractor() | Connector())(samples.sauropod(3000).points)
-    raw = replace(raw)  # without what the connector says of its points
-    turned, _ = placed(raw)
-    again = [refine(skeleton, limb=1e-9, recentre=1).report.decisions for skeleton in (raw, turned)]
-    assert len(again[0]) > 4
-    sure, also = (sorted(each.probability for each in decisions) for decisions in again)
-    np.testing.assert_allclose(sure, also, atol=1e-6)
 
 
 def test_a_thin_spout_of_a_thick_body_is_a_limb():

@@ -150,31 +150,28 @@ def test_limbs_without_a_cloud_stay():
     assert (len(skeleton.leaves), len(skeleton.junctions)) == (3, 1)
 
 
-def test_points_that_do_not_tell_of_the_surface_have_no_say():
-    """They belong to the vertex of the nearest one that does."""
+def test_points_that_do_not_show_the_surface_have_no_say_and_belong_to_the_nearest_that_does():
     raw = (pipelines.rings() | Contractor() | Connector())(samples.y_junction(n=6000).points)
-    told = raw.surface_points
-    rest = np.setdiff1d(np.arange(6000), told)
+    shown = raw.surface_points
+    rest = np.setdiff1d(np.arange(6000), shown)
     assert len(rest) > 1000
     points = raw.points.copy()
     points[rest] += 0.01
-    spoilt = replace(raw, points=points)
-    found, other = Refiner()(raw), Refiner()(spoilt)
+    found, other = Refiner()(raw), Refiner()(replace(raw, points=points))
     for name in ("vertices", "edges", "radii"):
         np.testing.assert_array_equal(getattr(found, name), getattr(other, name))
-    nearest = told[cKDTree(raw.points[told]).query(raw.points[rest])[1]]
+    nearest = shown[cKDTree(raw.points[shown]).query(raw.points[rest])[1]]
     np.testing.assert_array_equal(found.vertex_of_point[rest], found.vertex_of_point[nearest])
     np.testing.assert_array_equal(found.normals, raw.normals)
 
 
-def test_points_outside_a_sample_have_the_vertex_of_what_stands_for_them():
+def test_points_outside_a_sample_have_the_vertex_of_their_representative():
     raw = (pipelines.rings() | Contractor() | Connector())(samples.y_junction(n=120_000).points)
     outside = np.setdiff1d(np.arange(120_000), raw.supporting_points)
+    representative = raw.representative_of_point[outside]
     assert len(outside) > 50_000
-    assert np.isin(raw.representative_of_point[outside], raw.supporting_points).all()
-    away = np.linalg.norm(raw.points[outside] - raw.points[raw.representative_of_point[outside]], axis=1)
+    assert np.isin(representative, raw.supporting_points).all()
+    away = np.linalg.norm(raw.points[outside] - raw.points[representative], axis=1)
     assert np.quantile(away, 0.99) < np.median(raw.radii) / 4
-    found = Refiner()(raw)
-    np.testing.assert_array_equal(
-        found.vertex_of_point[outside], found.vertex_of_point[raw.representative_of_point[outside]]
-    )
+    owner = Refiner()(raw).vertex_of_point
+    np.testing.assert_array_equal(owner[outside], owner[representative])
