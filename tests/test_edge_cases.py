@@ -110,41 +110,7 @@ def test_refused_clouds(case):
         run(cloud, "default")
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_odd_sizes_are_like_any(name):
-    plain = run(Y, name)
-    for scale in (2.0**-300, 2.0**300):
-        odd = run(Y * scale, name)
-        np.testing.assert_allclose(odd.radii / scale, plain.radii, rtol=1e-6)
-        assert odd.length / scale == pytest.approx(plain.length, rel=1e-6)
-        assert odd.report.warnings == plain.report.warnings
-
-
-STEPWISE = ("8 points", "every point twice", "collinear", "coplanar", "two distant specks", "float32")
 PLAIN = ("float32", "whole numbers", "bytes", "list", "Fortran order", "big-endian")
-
-
-@pytest.mark.parametrize("case", STEPWISE)
-def test_every_filter_on_its_own(case, assert_sound):
-    """Every stage gives something sound, and leaves what it was given as it was."""
-    cloud = SOUND[case]
-    n = len(cloud)
-    built = glsk.RingBuilder()(cloud)
-    contracted = glsk.Contractor(max_iterations=1)(built)
-    reduced = glsk.LPRReducer()(contracted)
-    again = glsk.Contractor(max_iterations=1)(reduced)
-    for state in (built, contracted, reduced, again):
-        assert np.isfinite(state.positions).all()
-        assert state.survivor_of_point.shape == (n,)
-        assert state.survivor_of_point.min() >= 0
-        assert state.survivor_of_point.max() < len(state)
-        assert state.mass.sum() == state.report.n_distinct
-        assert state.rings.sizes.min() >= 1
-        assert state.rings.indices.max() < len(state)
-    assert_sound(glsk.Connector()(again), n, triangles=True)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SkeletonWarning)
-        assert_sound(glsk.Refiner()(glsk.Connector()(again)), n)
 
 
 @pytest.mark.parametrize("name", NAMES)

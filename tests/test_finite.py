@@ -108,12 +108,3 @@ def test_numbers_of_degenerate_clouds_are_finite(watched, how):
             assert (skeleton.radii >= 0).all()
             check_finite(Tracer(root="z").run(skeleton, RunContext()), "Tracer")
     assert done >= 18
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_clumps_on_a_line_have_a_spacing(watched, seed):
-    """The least variance of their surroundings is a difference that rounding may leave below 0."""
-    rng = np.random.default_rng(2 * seed + 30)
-    points = np.concatenate([1000 * rng.normal(size=3) + 1e-3 * rng.normal(size=(350, 3)) for _ in range(4)])
-    points = np.concatenate([points, 1e-3 * points[:, [1, 2, 0]]]) * [1, 0, 1e-9]
-    assert run(points, pipelines.rings().stages) is not None
