@@ -3,7 +3,6 @@
 import numpy as np
 import open3d as o3d
 import pytest
-from scipy.spatial import cKDTree
 
 from glsk_o3d import InvalidCloudError, InvalidParameterError, remove_redundant_points, samples
 
@@ -38,16 +37,6 @@ def test_legacy_clouds_arrays_tensors_and_lists():
     tensor, rows = remove_redundant_points(o3d.core.Tensor(POINTS))
     np.testing.assert_array_equal(tensor.numpy(), POINTS[rows.numpy()])
     assert remove_redundant_points(POINTS.astype(np.float32))[0].dtype == np.float32
-
-
-def test_smaller_with_every_pass_and_more_even_than_chance():
-    counts = [1500]
-    for passes in (1, 2, 3):
-        reduced, kept = remove_redundant_points(POINTS, passes=passes)
-        assert 0.5 * counts[-1] < len(kept) < 0.75 * counts[-1]
-        drawn = POINTS[np.random.default_rng(0).choice(1500, len(kept), False)]
-        assert cKDTree(reduced).query(POINTS)[0].mean() < cKDTree(drawn).query(POINTS)[0].mean()
-        counts.append(len(kept))
 
 
 def test_duplicates_and_outliers():

@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 
 import glsk_o3d as glsk
-from glsk_o3d import InvalidCloudError, Sampler, SkeletonWarning, pipelines, samples, skeletonize
+from glsk_o3d import InvalidCloudError, SkeletonWarning, pipelines, samples, skeletonize
 
 NAMES = ("default", *(pytest.param(name, marks=pytest.mark.slow) for name in pipelines.PIPELINES if name != "default"))
 RNG = np.random.default_rng(0)
 Y = samples.y_junction(n=300).points
 TORUS = samples.torus(n=300).points
 FEW = RNG.normal(size=(12, 3))
-GRID = np.stack(np.meshgrid(np.arange(16.0), np.arange(12.0), [0.0]), -1).reshape(-1, 3)
 
 CORNERS = np.stack(np.meshgrid([-1.0, 1], [-1.0, 1], [-1.0, 1]), -1).reshape(-1, 3)
 READ_ONLY = Y.copy()
@@ -22,43 +21,31 @@ READ_ONLY.setflags(write=False)
 
 # Clouds that have a skeleton, be it worth little.
 SOUND = {
-    **{f"{n} points": FEW[:n] for n in (8, 12)},
+    "8 points": FEW[:8],
     "corners of a cube": CORNERS,
     "every point twice": np.repeat(TORUS, 2, axis=0),
-    "one point 1000 times": np.concatenate([TORUS, np.repeat(TORUS[:1], 1000, axis=0)]),
-    "nearly doubled": np.concatenate([TORUS, TORUS + 1e-9 * RNG.normal(size=TORUS.shape)]),
     "doubled but for rounding": np.concatenate([TORUS, TORUS * (1 + 1e-15)]),
     "collinear": np.outer(np.linspace(0, 1, 100), [1, 2, 3]),
-    "8 collinear": np.outer(np.arange(8), [0, 1, 0]),
     "two crossing lines": np.concatenate([np.outer(np.arange(-20, 21), axis) for axis in np.eye(3)[:2]]),
     "circle": np.stack([np.cos(a := np.arange(60) / 60 * 2 * np.pi), np.sin(a), 0 * a], axis=1),
-    "square grid": GRID,
     "coplanar": Y * [1, 0, 1],
     "full cubic grid": np.stack(np.meshgrid(*[np.arange(6.0)] * 3), -1).reshape(-1, 3),
-    "full ball": RNG.normal(size=(300, 3)),
     "two components": np.concatenate([Y, Y + [3, 0, 0]]),
     "two distant specks": np.concatenate([Y * 1e-12, Y * 1e-12 + [1, 0, 0]]),
     "an outlier": np.concatenate([Y, [[100.0, 100, 100]]]),
     "a far outlier": np.concatenate([Y, [[1e9, 0, 0]]]),
-    "far from the origin": Y + 1e6,
-    "farther": Y + [1e9, -1e9, 0],
     "1e-100 as large": Y * 1e-100,
     "1e100 times as large": Y * 1e100,
     "points a subnormal apart": np.concatenate([CORNERS, samples.sphere(n=80).points, Y[:30] * 1e-155]),
     "float32": Y.astype(np.float32),
-    "float16": Y.astype(np.float16),
     "big-endian": Y.astype(">f8"),
     "whole numbers": (Y * 1000).astype(int),
     "bytes": (Y * 100 + 100).astype(np.uint8),
     "list": Y.tolist(),
     "read-only": READ_ONLY,
     "Fortran order": np.asfortranarray(Y),
-    "not contiguous": np.repeat(Y, 2, axis=0)[::2, ::-1],
-    "minus zero": np.concatenate([Y, [[0.0, 0, 0], [-0.0, 0, -0.0]]]),
     "sphere": samples.sphere(n=300).points,
     "sheet": samples.sheet(n=300).points,
-    "flat sheet": samples.sheet(n=300, bend=0).points,
-    "open tube": samples.tube(n=300, capped=False).points,
 }
 
 NAN = Y.copy()
@@ -68,28 +55,20 @@ MASKED = np.ma.masked_greater(Y, 0)
 # What is refused, and the words that help.
 REFUSED = {
     "nothing": (np.empty((0, 3)), "empty"),
-    "empty list": ([], "empty"),
     **{f"{n} points": (FEW[:n], rf"{n} .*at least 8") for n in (1, 7)},
     "all equal": (np.full((50, 3), 1e6 + 0.1), "coincide"),
-    "zeros": (np.zeros((9, 3)), "coincide"),
     "7 distinct ones": (np.repeat(FEW[:7], 20, axis=0), "7 distinct"),
     "NaN and infinity": (NAN, "index 2.*drop_invalid"),
-    "nothing but NaN": (np.full((20, 3), np.nan), "none of its 20 points"),
     "too wide for float64": (np.concatenate([Y, [[1.5e308, 0, 0], [-1.5e308, 0, 0]]]), "rescale"),
     "two columns": (Y[:, :2], r"\(300, 2\)"),
-    "six columns": (np.hstack([Y, Y]), r"\(300, 6\)"),
     "one dimension": (Y.ravel(), r"\(900,\)"),
-    "three dimensions": (Y[None], r"\(1, 300, 3\)"),
     "a number": (3.5, "float"),
     "nothing at all": (None, "NoneType"),
     "file name": ("scan.ply", "read_cloud"),
     "complex": (Y * 1j, "complex"),
-    "truth values": (Y > 0, "bool"),
     "objects": (Y.astype(object), "object"),
-    "text": (Y.astype(str), "<U"),
     "ragged": ([[1, 2, 3], [4, 5]], "list"),
     "masked": (MASKED, "masked"),
-    "dictionary": ({"points": Y}, "dict"),
 }
 
 
@@ -131,47 +110,7 @@ def test_refused_clouds(case):
         run(cloud, "default")
 
 
-@pytest.mark.parametrize("scale", [1e-300, 1e-130, 1e130, 1e306])
-def test_extreme_sizes_are_refused(scale):
-    with pytest.raises(InvalidCloudError, match="rescale"):
-        run(Y * scale, "default")
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_odd_sizes_are_like_any(name):
-    plain = run(Y, name)
-    for scale in (2.0**-300, 2.0**300):
-        odd = run(Y * scale, name)
-        np.testing.assert_allclose(odd.radii / scale, plain.radii, rtol=1e-6)
-        assert odd.length / scale == pytest.approx(plain.length, rel=1e-6)
-        assert odd.report.warnings == plain.report.warnings
-
-
-STEPWISE = ("8 points", "every point twice", "collinear", "coplanar", "two distant specks", "float32")
-PLAIN = ("float32", "float16", "whole numbers", "bytes", "list", "Fortran order", "big-endian")
-
-
-@pytest.mark.parametrize("case", STEPWISE)
-def test_every_filter_on_its_own(case, assert_sound):
-    """Every stage gives something sound, and leaves what it was given as it was."""
-    cloud = SOUND[case]
-    n = len(cloud)
-    built = glsk.RingBuilder()(cloud)
-    contracted = glsk.Contractor(max_iterations=1)(built)
-    reduced = glsk.LPRReducer()(contracted)
-    again = glsk.Contractor(max_iterations=1)(reduced)
-    for state in (built, contracted, reduced, again):
-        assert np.isfinite(state.positions).all()
-        assert state.survivor_of_point.shape == (n,)
-        assert state.survivor_of_point.min() >= 0
-        assert state.survivor_of_point.max() < len(state)
-        assert state.mass.sum() == state.report.n_distinct
-        assert state.rings.sizes.min() >= 1
-        assert state.rings.indices.max() < len(state)
-    assert_sound(glsk.Connector()(again), n, triangles=True)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SkeletonWarning)
-        assert_sound(glsk.Refiner()(glsk.Connector()(again)), n)
+PLAIN = ("float32", "whole numbers", "bytes", "list", "Fortran order", "big-endian")
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -192,18 +131,9 @@ def test_invalid_points_can_be_dropped(name, assert_sound):
         run(few, dropping)
 
 
-@pytest.mark.parametrize("name", ["wen2024", "cao2010", "default"])
-def test_two_components_are_skeletonised_each(name):
-    skeleton = run(SOUND["two components"], name)
-    assert skeleton.n_components >= 2
-    side = skeleton.vertices[:, 0] > 1.5
-    np.testing.assert_array_equal(side[skeleton.vertex_of_point], np.repeat([False, True], 300))
-    assert (side[skeleton.edges[:, 0]] == side[skeleton.edges[:, 1]]).all()
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_warns_where_no_curve_skeleton_is_meaningful(name):
-    for case, kind in (("sphere", "-like"), ("sheet", "sheet-like"), ("flat sheet", "sheet-like")):
+    for case, kind in (("sphere", "-like"), ("sheet", "sheet-like")):
         assert any(kind in message for message in run(SOUND[case], name).report.warnings)
 
 
@@ -227,54 +157,17 @@ def test_copies_count_once(name):
     np.testing.assert_array_equal(doubled.vertex_of_point, np.repeat(single.vertex_of_point, 2))
 
 
-@pytest.mark.parametrize("case", ["a tenth twice", "all three times, shuffled", "forty times in one place"])
-def test_copies_of_some_points_count_once(case):
-    """Of a body with a surface, of a crown whose parts are traced, and of noise."""
-    rng = np.random.default_rng(0)
-    for cloud in (samples.sauropod(2500).points, samples.tree(3000).points, samples.torus(9000, noise=0.04).points):
-        n = len(cloud)
-        copies = {
-            "a tenth twice": rng.permutation(n)[: n // 10],
-            "all three times, shuffled": rng.permutation(np.repeat(np.arange(n), 2)),
-            "forty times in one place": np.repeat(rng.permutation(n)[:50], 40),
-        }[case]
-        order = rng.permutation(n + len(copies))
-        assert_equal_curves(run(np.concatenate([cloud, cloud[copies]])[order], "default"), run(cloud, "default"))
-
-
-@pytest.mark.parametrize("apart", [1e-15, 1e-14, 1e-11, 1e-8])
+@pytest.mark.parametrize("apart", [1e-15, 1e-11, 1e-8])
 def test_what_is_a_copy_is_said_by_the_spacing(apart):
-    """Copies moved by much less than the points are apart: neither their number nor the graph changes."""
-    rng = np.random.default_rng(0)
-    for cloud in (samples.two_rings(1000).points, samples.sauropod(2500).points):
-        moved = [cloud + apart * rng.normal(size=cloud.shape) for _ in range(4)]
-        several, single = run(np.concatenate([cloud, *moved]), "default"), run(cloud, "default")
-        assert several.report.n_distinct == len(cloud)
-        assert (several.n_components, several.n_loops, len(several.leaves)) == (
-            single.n_components,
-            single.n_loops,
-            len(single.leaves),
-        )
-
-
-@pytest.mark.parametrize("copies", [2, 16, 40])
-def test_many_near_copies_are_copies(copies):
-    """Also where all neighbours of a point are its copies, and far outliers say nothing about the spacing."""
-    rng = np.random.default_rng(0)
-    cloud = samples.two_rings(600).points
-    moved = np.repeat(cloud, copies, axis=0)
-    moved += 1e-10 * rng.normal(size=moved.shape)
-    for far in ([], [[300.0, 0, 0], [0, -200.0, 0]]):
-        state = Sampler(size="all")(np.concatenate([moved, np.reshape(far, (-1, 3))]))
-        assert len(state.cloud) == len(cloud) + len(far)
-
-
-@pytest.mark.parametrize("ratio", [1e-4, 1e-5, 1e-7])
-def test_a_small_object_beside_a_large_one_is_no_place_with_copies(ratio):
-    small, large = samples.torus(2000).points, samples.torus(4000).points
-    state = Sampler(size="all")(np.concatenate([ratio * small, large + [5, 0, 0]]))
-    assert len(state.cloud) == 6000
-    assert len(Sampler(size="all")(np.outer(np.logspace(-9, 0, 3000), [1, 2, 3])).cloud) == 3000
+    """Copies moved by much less than the points are apart; and a small object beside a large one is none."""
+    rng, cloud = np.random.default_rng(0), samples.sauropod(2500).points
+    moved = [cloud + apart * rng.normal(size=cloud.shape) for _ in range(4)]
+    several, single = run(np.concatenate([cloud, *moved]), "default"), run(cloud, "default")
+    assert several.report.n_distinct == len(cloud)
+    assert [several.n_components, several.n_loops, len(several.leaves)] == [1, single.n_loops, len(single.leaves)]
+    beside = glsk.Sampler(size="all")(np.concatenate([1e-6 * cloud, cloud + [5, 0, 0]]))
+    assert len(beside.cloud) == 5000
+    assert len(glsk.Sampler(size="all")(np.outer(np.logspace(-9, 0, 3000), [1, 2, 3])).cloud) == 3000
 
 
 def assert_equal_curves(one, other):

@@ -20,7 +20,6 @@ from glsk_o3d import (
     Tracer,
     samples,
 )
-from glsk_o3d.parameters import resolve_length
 
 FILTERS = (RingBuilder, Contractor, LPRReducer, Connector, Refiner)
 DESCRIBED = (*FILTERS, ExplainedScore, RingSizeRatio)
@@ -100,11 +99,6 @@ def test_parameters_of_a_part_are_checked_too():
         (RingBuilder() | Contractor(reducer=LPRReducer(phi=0)))(POINTS)
 
 
-@pytest.mark.parametrize(("length", "expected"), [("2%", 1), (" 0.5 % ", 0.25), ("1e1%", 5), (".5%", 0.25), (7, 7)])
-def test_lengths(length, expected):
-    assert resolve_length(length, 50.0) == pytest.approx(expected, rel=1e-15)
-
-
 @pytest.mark.parametrize("cls", DESCRIBED)
 def test_frozen_hashable_and_documented(cls):
     one = cls()
@@ -133,9 +127,3 @@ def test_frozen_hashable_and_documented(cls):
 def test_numbers_beyond_what_can_be_computed_with_are_none(cls, options, message):
     with pytest.raises(InvalidParameterError, match=message):
         cls(**options)
-
-
-def test_no_error_repeats_pages():
-    with pytest.raises(InvalidParameterError, match=r"^no filter is called 'x+ \.\.\. x+'$") as caught:
-        raise InvalidParameterError(f"no filter is called {'x' * 5000!r}")
-    assert len(str(caught.value)) < 1000

@@ -2,7 +2,6 @@
 
 import dataclasses
 import operator
-from copy import deepcopy
 from functools import reduce
 
 import numpy as np
@@ -53,9 +52,6 @@ def assert_same(a, b):
         assert getattr(a.report, name) == getattr(b.report, name)
 
 
-# ---- filters
-
-
 @pytest.fixture(scope="module")
 def flow():
     """What comes out of every stage, by its class."""
@@ -76,20 +72,6 @@ def flow():
 def test_what_belongs_elsewhere_is_refused(cls, given, flow):
     with pytest.raises(StageError, match=cls.__name__):
         cls()(flow[given])
-
-
-@pytest.mark.parametrize("cls", FILTERS)
-def test_calls_leave_their_input_alone_and_are_repeatable(cls, flow):
-    given, before = flow[cls.consumes], deepcopy(flow[cls.consumes])
-    first, second = cls()(given), cls()(given)
-    for one, other in ((given, before), (first, second)):
-        if isinstance(one, np.ndarray):
-            np.testing.assert_array_equal(one, other)
-        else:
-            assert_same_arrays(one, other)
-
-
-# ---- composition
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -151,15 +133,6 @@ def test_only_filters_can_be_joined_and_only_pipelines_run(thing):
         Pipeline()
 
 
-@pytest.mark.parametrize("incomplete", [RingBuilder(), RingBuilder() | Contractor()], ids=repr)
-def test_incomplete_pipelines_are_refused(incomplete):
-    with pytest.raises(InvalidParameterError):
-        skeletonize(POINTS, incomplete)
-
-
-# ---- other options
-
-
 def test_options_by_full_and_by_short_name():
     *prepare, builder, contractor, connector, refiner, tracer = pipelines.default().stages
     varied = pipelines.default().with_options({"RingBuilder.k": 24, "phi": 2e5}, spacing=1)
@@ -172,14 +145,6 @@ def test_options_by_full_and_by_short_name():
         | tracer
     )
     assert pipelines.default().with_options() == pipelines.default().with_options({}) == pipelines.default()
-
-
-def test_options_reach_every_filter_of_the_name():
-    twice = Contractor(reducer=LPRReducer()) | LPRReducer() | Contractor()
-    varied = twice.with_options(phi=3, max_iterations=2)
-    assert varied == (
-        Contractor(reducer=LPRReducer(phi=3), max_iterations=2) | LPRReducer(phi=3) | Contractor(max_iterations=2)
-    )
 
 
 @pytest.mark.parametrize("order", [1, -1])
@@ -214,17 +179,11 @@ def test_options_that_are_none_or_wrong_or_given_twice(options, named, words):
         skeletonize(np.zeros((0, 3)), options, **named)
 
 
-# ---- skeletonize
-
-
-def test_unknown_names_tell_the_nearest_or_list_the_known_ones():
-    with pytest.raises(InvalidParameterError, match="'cao2010'"):
-        skeletonize(POINTS, "cao2011")
-    with pytest.raises(InvalidParameterError, match="wen2024, cao2010"):
-        skeletonize(POINTS, "best")
-
-
-# ---- closed forms, end to end
+def test_unknown_names_tell_the_nearest_or_list_the_known_ones_and_incomplete_pipelines_are_refused():
+    known = (("cao2011", "'cao2010'"), ("best", "wen2024, cao2010"), (RingBuilder() | Contractor(), "from a cloud"))
+    for wrong, words in known:
+        with pytest.raises(InvalidParameterError, match=words):
+            skeletonize(POINTS, wrong)
 
 
 @pytest.mark.parametrize(
@@ -241,28 +200,18 @@ def test_default_on_shapes_with_a_known_axis(shape, components, loops, leaves):
     assert np.median(skeleton.radii) == pytest.approx(sample.radii.mean(), rel=0.1)
 
 
-# ---- equivariance, end to end
-
-MOVES = {
-    "shift by 1e6": (lambda x: x + 1e6, lambda x: x - 1e6),
-    "1000 times smaller": (lambda x: x * 1e-3, lambda x: x * 1e3),
-    "1000 times larger": (lambda x: x * 1e3, lambda x: x * 1e-3),
-    "a quarter about the diagonal": (lambda x: x[:, [2, 0, 1]], lambda x: x[:, [1, 2, 0]]),
-}
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["cao2010", "default"])
 def test_moves_and_scales_along_with_the_cloud(name):
     """Measured: vertices agree to 1e-7 tube radii, from roundings of 1e-16 that ill-conditioned late solves blow up."""
     shape = np.round(samples.y_junction(n=700).points * 2**20) / 2**20  # so that the shift costs them 1e-10
-    still = skeletonize(shape, name)
-    for there, back in MOVES.values():
-        moved = skeletonize(there(shape), name)
+    still, turn = skeletonize(shape, name), np.eye(3)[[1, 2, 0]]
+    for scale, shift, turned in ((1, 1e6, np.eye(3)), (1e-3, 0, np.eye(3)), (1e3, 0, turn)):
+        moved = skeletonize(scale * shape @ turned + shift, name)
         np.testing.assert_array_equal(moved.edges, still.edges)
         np.testing.assert_array_equal(moved.vertex_of_point, still.vertex_of_point)
-        np.testing.assert_allclose(back(moved.vertices), still.vertices, atol=1e-6 * 0.1)
-        np.testing.assert_allclose(moved.radii / np.ptp(there(shape)), still.radii / np.ptp(shape), rtol=1e-5)
+        np.testing.assert_allclose((moved.vertices - shift) @ turned.T / scale, still.vertices, atol=1e-6 * 0.1)
+        np.testing.assert_allclose(moved.radii / scale, still.radii, rtol=1e-5)
 
 
 @pytest.mark.slow
@@ -288,19 +237,11 @@ def test_any_rotation_of_the_points_in_any_order(name):
     np.testing.assert_allclose(turned.confidence, still.confidence[place], atol=1e-6)
 
 
-# ----------------------------------------------------------------------------------------------------------- callbacks
-
-
-@pytest.mark.parametrize("answer", [False, np.False_, 0, 0.0, np.int64(0)])
+@pytest.mark.parametrize("answer", [False, np.False_, 0])
 def test_what_stops_a_contraction(answer):
     stopped = skeletonize(POINTS, on_iteration=lambda record: answer if record.iteration == 2 else None)
     assert len(stopped.report.iterations) == 2
     assert stopped.report.stop_reason == "stopped by the caller"
-
-
-@pytest.mark.parametrize("answer", [None, True, np.True_, 1, "", [], object()])
-def test_what_does_not(answer):
-    assert_same(skeletonize(POINTS, on_iteration=lambda record: answer), skeletonize(POINTS))
 
 
 def test_what_a_caller_does_to_a_state_does_not_change_the_run():

@@ -11,7 +11,21 @@ import numpy as np
 import open3d as o3d
 
 import glsk_o3d as glsk
-from glsk_o3d import Connector, Contraction, Contractor, LPRReducer, Pipeline, Refiner, RingBuilder, Skeleton, pipelines
+from glsk_o3d import (
+    Cloud,
+    Connector,
+    Contraction,
+    Contractor,
+    LPRReducer,
+    Pipeline,
+    Points,
+    Refiner,
+    RingBuilder,
+    Sampler,
+    Skeleton,
+    Tracer,
+    pipelines,
+)
 from glsk_o3d.filters.stopping import ExplainedScore
 
 cloud = glsk.read_cloud("scan.ply")
@@ -22,10 +36,11 @@ skeleton = glsk.skeletonize(cloud, {"RingBuilder.k": 24}, on_iteration=lambda re
 skeleton = glsk.skeletonize(cloud, {"Connector.radius": "2%"}, k=24)
 skeleton = glsk.skeletonize(cloud, k="auto", reducer=None, root=(0, 0, 1), links="nearest")
 skeleton = glsk.skeletonize(cloud, "pipeline of a plugin", option_of_its=3)
-start: Pipeline[Contraction] = RingBuilder(k="auto") | Contractor(reducer=LPRReducer(), stop=ExplainedScore(0.02))
+start: Pipeline[Points, Contraction] = RingBuilder() | Contractor(reducer=LPRReducer(), stop=ExplainedScore(0.02))
 state: Contraction = start(cloud)
-whole: Pipeline[Any, Skeleton] = start | Connector(radius="2%", links="all") | Refiner()
+whole: Pipeline[Points, Skeleton] = start | Connector(radius="2%", links="all") | Refiner()
 skeleton = whole(cloud, on_stage=lambda stage: print(stage.kind))
+prepared: Pipeline[Cloud, Skeleton] = Sampler() | (whole | Tracer())
 skeleton = pipelines.default().with_options(k=24)(cloud)
 RingBuilder(k=24, radius=0.1)
 glsk.save_skeleton(skeleton, "tree.swc", cut_loops=True)
@@ -43,6 +58,11 @@ LPRReducer(order="random")  # wrong
 Connector(links="al")  # wrong
 Refiner(recentre="3")  # wrong
 RingBuilder() | 12  # wrong
+RingBuilder() | Refiner()  # wrong
+Connector() | Contractor()  # wrong
+start | Tracer()  # wrong
+Refiner() | whole  # wrong
+skeletons: Pipeline[Points, Contraction] = whole  # wrong
 glsk.save_skeleton(skeleton, "x.swc", cut_lops=True)  # wrong
 glsk.to_line_set(skeleton, "brnch")  # wrong
 skeleton.to_line_set().colours  # wrong

@@ -23,7 +23,9 @@ def surface_sample(curve: Curve) -> np.ndarray:
     """
     rows, m = curve.surface_points, len(curve.vertices)
     clean = 1 - curve.report.noise
-    if not len(rows) or len(rows) * clean <= REFINED_POINTS:
+    if not len(rows):  # all points that have a vertex
+        return np.flatnonzero(curve.vertex_of_point >= 0)
+    if len(rows) * clean <= REFINED_POINTS:
         return rows
     rows = rows[morton_order(curve.points[rows])]
     vertex = curve.vertex_of_point[rows]
@@ -64,7 +66,8 @@ def on_points(step: Callable[[Curve], Curve], curve: Curve, rows: np.ndarray) ->
     owner, normals = np.full(len(curve.points), -1), curve.normals.copy()
     owner[rows], normals[rows] = result.vertex_of_point, result.normals
     representative = curve.representative_of_point[others]
-    representative = np.where(representative < 0, others, representative)
+    unknown = (representative < 0) | (curve.vertex_of_point[representative] < 0)
+    representative = np.where(unknown, others, representative)
     alone = others[representative == others]
     if len(alone):
         alone = alone[morton_order(curve.points[alone])]  # the tree is quicker with what is near in turn

@@ -53,8 +53,9 @@ class Graph(Changeable):
 
         Those that represent themselves; of a skeleton without representatives all.
         """
-        own = self.representative_of_point == np.arange(len(self.points))
-        return np.flatnonzero(own) if own.any() else self.supporting_points
+        points = self.supporting_points
+        own = points[self.representative_of_point[points] == points]
+        return own if len(own) else points
 
     @property
     def leaves(self) -> np.ndarray:

@@ -215,7 +215,8 @@ def _complete(skeleton: Skeleton) -> None:
             array = np.asarray(() if given is None else given)
         except (TypeError, ValueError) as error:  # rows of unequal length, and what else
             raise InvalidParameterError(f"{name}: is no array: {brief(error)}") from None
-        array = array if array.size else np.empty((0, *columns), kind)
+        unknown = name == "representative_of_point" and (array == -1).all()
+        array = array if array.size and not unknown else np.empty((0, *columns), kind)
         if array.shape[1:] != columns or array.ndim == 0 or not np.can_cast(array.dtype, kind, "safe"):
             meant = f"{'whole ' * (kind is int)}numbers, {columns[0] if columns else 1} a row"
             raise InvalidParameterError(f"{name}: has shape {array.shape} and dtype {array.dtype}: must be {meant}")

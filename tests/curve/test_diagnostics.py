@@ -14,16 +14,6 @@ def sheet(n):
     return points, np.tile([0.0, 0, 1], (n, 1)), [[-0.5, 0, 0], [0, 0, 0], [0.5, 0, 0]]
 
 
-def plate(n, long, wide=0.5, thick=0.04):
-    """The faces and the long sides of a plate, and a curve in the middle."""
-    rng = np.random.default_rng(0)
-    side = rng.random((n, 1)) < thick / (wide + thick)
-    points = rng.uniform(-1, 1, (n, 3))
-    points = np.where(np.hstack([0 * side, side, ~side]), np.sign(points), points) * [long, wide, thick]
-    x = np.linspace(-0.8 * long, 0.8 * long, 9)
-    return points, np.where(side, [0.0, 1, 0], [0.0, 0, 1]), np.column_stack([x, 0 * x, 0 * x])
-
-
 def ball(n):
     normals = np.random.default_rng(0).normal(size=(n, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -81,29 +71,11 @@ def test_shapes(refine, shapes, start, size):
     assert not start or messages[0].startswith(start)
 
 
-@pytest.mark.parametrize(("long", "start"), [(0.6, "sheet-like: around 100% of the points"), (4, None)])
-def test_a_plate_has_no_axis_and_a_blade_has(refine, long, start):
-    """Both have two sides, and are sure of what is between them."""
-    found = refine(skeleton_of(plate(int(8000 * long), long)), recentre=1)
-    assert np.median(found.confidence) > 0.3
-    assert [message[: len(start or "")] for message in found.report.warnings] == ([start] if start else [])
-
-
 def test_names_the_region_that_is_weakly_supported(refine):
     (message,) = refine(skeleton_of(torus(400), unsure(600), size=1000)).report.warnings
     reach, place = re.search(r"above all within (\S+) of \((.*?)\)", message).groups()
     assert float(reach) == pytest.approx(1000, rel=0.1)
     np.testing.assert_allclose([float(c) for c in place.split(",")], [10_000, 0, 0], atol=100)
-
-
-def test_one_reason_is_enough(refine):
-    angle, x = np.random.default_rng(2).uniform([[0], [-1]], [[2 * np.pi], [1]], (2, 800))
-    normals = np.column_stack([0 * angle, np.cos(angle), np.sin(angle)])
-    tube = 0.1 * normals + x[:, None] * [1, 0, 0], normals, [[0, 0, 0]]
-    (message,) = refine(skeleton_of(tube, tube)).report.warnings
-    assert message.startswith("no edges: every part became one vertex")
-    (message,) = refine(skeleton_of(sheet(400), joined=False)).report.warnings
-    assert message.startswith("sheet-like")
 
 
 CALLS = (

@@ -1,13 +1,10 @@
 """Ends go on along their limbs and stop where these do."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton, samples, skeletonize
-from glsk_o3d.curve.shape.ends import regrow_ends
 
 R = 0.1
 LENGTH = 1.2
@@ -63,54 +60,6 @@ def test_an_end_stops_where_its_limb_does(refine, cap, where, stop, hook):
     np.testing.assert_allclose(found, [LENGTH + where * R, 0, 0], atol=0.15 * R)
 
 
-@pytest.mark.parametrize("beside", [0, 8])
-def test_an_end_bent_into_a_corner_where_others_have_the_points_is_straightened(beside):
-    """The last radius of the curve turns aside, and owns next to nothing: only what is behind it knows of the limb."""
-    points, normals = limb("flat")
-    straight, k = fork(points, normals, LENGTH - R / 2), 12
-    m, end = len(straight.vertices), len(straight.vertices) - 3
-    aside = np.linspace(0, R, k + 1)[1:, None] * [0.2, 1, 0] + straight.vertices[end]
-    edges = [*straight.edges.tolist(), [end, m], *([i, i + 1] for i in range(m, m + k - 1))]
-    owner = straight.vertex_of_point.copy()
-    owner[np.argsort(np.linalg.norm(points - aside[-1], axis=1))[:beside]] = m + k - 1
-    radii = np.where(np.arange(m + k) < m, R, R / 20)
-    bent = Skeleton(np.concatenate([straight.vertices, aside]), sorted(edges), radii, owner, points, normals)
-    grown = regrow_ends(bent)
-    np.testing.assert_allclose(tip(grown), [LENGTH - R / 2, 0, 0], atol=0.2 * R)
-    limbs = grown.vertices[np.abs(grown.vertices[:, 1]) < 1]
-    assert np.abs(limbs[:, 1:]).max() < 0.2 * R
-
-
-def test_a_wire_on_a_thick_hub_keeps_its_bend():
-    """Points of the hub, which its first vertex owns, do not say that the wire has hardly any."""
-    rng, thin, turn = np.random.default_rng(0), R / 20, np.linspace(0, 3, 60)
-    hub = rng.normal(size=(8000, 3))
-    hub *= R / np.linalg.norm(hub, axis=1, keepdims=True)
-    axis = R * np.column_stack([np.sin(turn), 1 - np.cos(turn), 0 * turn])
-    place, angle = rng.uniform(1, 58, 150).astype(int), rng.uniform(0, 2 * np.pi, (150, 1))
-    side = np.column_stack([-np.sin(turn), np.cos(turn), 0 * turn])[place]
-    out = np.cos(angle) * side + np.sin(angle) * [0, 0, 1]
-    vertices = np.concatenate([axis, [[0, 0, 5], [0, 0, -5]]])
-    edges = [[0, 60], [0, 61], *([i, i + 1] for i in range(59))]
-    owner = np.concatenate([np.zeros(8000, int), place])
-    points, radii = np.concatenate([hub, axis[place] + thin * out]), np.full(62, thin)
-    grown = regrow_ends(Skeleton(vertices, sorted(edges), radii, owner, points, np.concatenate([hub / R, out])))
-    assert cKDTree(axis).query(grown.vertices[np.abs(grown.vertices[:, 2]) < 1])[0].max() < 2 * thin
-
-
-def test_the_end_of_a_long_bent_limb_is_not_cut_by_its_length():
-    """A fiftieth of the points of a spring are eight of its radii: they stay as they are, but for the cap."""
-    turn = np.linspace(0, 10 * np.pi, 40_000)
-    axis = np.column_stack([np.cos(turn), np.sin(turn), turn / 20])
-    rng, way = np.random.default_rng(0), np.gradient(axis, axis=0)
-    place = rng.integers(0, len(axis), 8000)
-    out = np.cross(way[place], rng.normal(size=(8000, 3)))
-    points = axis[place] + 0.08 * out / np.linalg.norm(out, axis=1, keepdims=True)
-    found = skeletonize(points)
-    assert cKDTree(axis).query(found.vertices)[0].max() < 0.4 * 0.08
-    assert cKDTree(found.vertices).query(axis[[0, -1]])[0].max() < 0.08
-
-
 def bottle(thin, long, n=6000):
     """A tube of radius R with a neck of that radius and length, and faces at its shoulder and at the end."""
     rng = np.random.default_rng(0)
@@ -124,22 +73,13 @@ def bottle(thin, long, n=6000):
 
 
 @pytest.mark.parametrize("stop", [-1, 0, 1])
-@pytest.mark.parametrize(("thin", "long"), [(0.3, 1), (0.3, 2), (0.4, 1), (0.4, 1.5)])
+@pytest.mark.parametrize(("thin", "long"), [(0.3, 1), (0.4, 1.5)])
 def test_a_neck_goes_on_beyond_its_shoulder(refine, thin, long, stop):
     """Even one no longer than its limb is thick: the curve ends half its radius inside its face, and as thin as it."""
     found = refine(fork(*bottle(thin * R, long * R), LENGTH + stop * R), recentre=3)
     end = np.flatnonzero((found.vertices == tip(found)).all(axis=1))
     np.testing.assert_allclose(tip(found), [LENGTH + (long - thin / 2) * R, 0, 0], atol=0.1 * R)
     np.testing.assert_allclose(found.radii[end], thin * R, rtol=0.1)
-
-
-@pytest.mark.parametrize("cap", ["flat", "round"])
-def test_half_a_limb_is_enough(refine, cap):
-    """Seen from one side."""
-    points, normals = limb(cap)
-    seen = points[:, 1] > 0
-    found = tip(refine(fork(points[seen], normals[seen], LENGTH, 1), recentre=3))
-    np.testing.assert_allclose(found, [LENGTH - (cap == "flat") * R / 2, 0, 0], atol=0.2 * R)
 
 
 def test_new_vertices_are_like_those_behind(refine):
@@ -162,37 +102,3 @@ def test_a_head_that_hangs_from_its_neck_has_an_axis(n, seed):
     nose = body.nodes[np.argmax(body.nodes[:, 0])]
     away = np.linalg.norm(skeleton.vertices[skeleton.leaves] - nose, axis=1)
     assert away.min() < 0.035  # .75 radii there
-
-
-def test_the_radii_of_wide_ends_are_their_own():
-    """Two balls on a bar: the run behind their outer halves is the bar's."""
-    rng = np.random.default_rng(0)
-    ball, turn = rng.standard_normal((5000, 3)), rng.uniform(0, 2 * np.pi, 1500)
-    ball *= 0.3 / np.linalg.norm(ball, axis=1, keepdims=True)
-    ball[:, 0] += np.where(np.arange(5000) % 2, 0.9, -0.9)
-    bar = np.column_stack([rng.uniform(-0.62, 0.62, 1500), 0.1 * np.cos(turn), 0.1 * np.sin(turn)])
-    outside = (np.hypot(ball[:, 1], ball[:, 2]) > 0.1) | (np.abs(ball[:, 0]) > 0.9)
-    found = skeletonize(np.concatenate([ball[outside], bar]))
-    x = np.abs(found.vertices[:, 0])
-    true = np.where(x > 0.62, np.sqrt(np.maximum(0.09 - (x - 0.9) ** 2, 0.01)), 0.1)
-    assert x.max() > 1
-    assert np.abs(found.radii - true)[x > 0.75].mean() < 0.04  # .1 with the run's
-
-
-@pytest.mark.parametrize(("reach", "stays"), [(0.8, True), (0.3, False)])
-def test_an_end_that_does_not_leave_its_body_stays(reach, stays):
-    """The run behind it lies in the body, of which the junction's points are the surface, and leads nowhere."""
-    points, normals = limb("round")
-    out = points[:, 0] > 0.3
-    skeleton = fork(points[out], normals[out], 0.6, hook=R)
-    body = np.random.default_rng(0).normal(size=(200, 3))
-    body *= reach / np.linalg.norm(body, axis=1, keepdims=True)
-    owner = np.concatenate([skeleton.vertex_of_point, np.zeros(len(body), int)])
-    with_body = replace(
-        skeleton,
-        points=np.concatenate([skeleton.points, body]),
-        normals=np.concatenate([skeleton.normals, body / reach]),
-        vertex_of_point=owner,
-    )
-    grown = regrow_ends(with_body)
-    assert np.array_equal(grown.vertices, with_body.vertices) == stays

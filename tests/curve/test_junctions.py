@@ -82,10 +82,3 @@ def test_limbs_that_meet_a_trunk_within_a_radius_share_a_junction(refine, quadru
     a, b = skeleton.vertices[skeleton.edges].transpose(1, 0, 2)
     curve = np.concatenate([(1 - t) * a + t * b for t in np.linspace(0, 1, 21)])
     assert cKDTree(curve).query(skeleton.vertices * [1, -1, 1])[0].max() < 0.2 * R
-
-
-def test_two_limbs_side_by_side_do_not_close_a_loop(piped, refine):
-    """A ring no wider than the radius of its limbs keeps both its sides."""
-    ring = [((0, 0, 0), (R / 4, s * R, 0), (R / 2, 0, 0)) for s in (-1, 1)]
-    tails = [((0, 0, 0), (-1, 0, 0)), ((R / 2, 0, 0), (1, 0, 0))]
-    assert refine(piped([*ring, *tails], tails), recentre=3).n_loops == 1

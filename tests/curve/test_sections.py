@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from glsk_o3d import samples, skeletonize
-from glsk_o3d.curve.axis.sections import measure_sections
+from glsk_o3d.curve.curve import Curve
+
+
+def measure_sections(skeleton):
+    return Curve.of(skeleton).sections
 
 
 def half_axes(sections):
@@ -40,14 +43,3 @@ def test_what_nobody_saw_is_the_radius(flat_bar):
     pointless = measure_sections(replace(bar, vertex_of_point=np.where(bar.vertex_of_point == 7, -1, 8)))
     np.testing.assert_array_equal(half_axes(pointless)[[0, 7, 40]], 0.3)
     np.testing.assert_allclose(half_axes(pointless)[8], [0.4, 0.2])
-
-
-@pytest.mark.slow
-def test_skeletons_come_with_their_sections(flat_bar):
-    ring = skeletonize(samples.torus(2000).points)
-    np.testing.assert_allclose([ring.half_width, ring.half_thickness], [ring.radii] * 2, rtol=0.03)
-    bar = skeletonize(flat_bar(0.4, 0.2).points)
-    middle = np.abs(bar.vertices[:, 2]) < 0.8
-    assert np.median(bar.half_width[middle]) == pytest.approx(0.4, rel=0.05)
-    assert np.median(bar.half_thickness[middle]) == pytest.approx(0.2, rel=0.2)
-    assert (bar.half_width >= bar.half_thickness).all()

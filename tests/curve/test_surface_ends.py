@@ -40,8 +40,6 @@ SHAPES = {  # what draws it, its length, and what may be short or long of it wit
     "round bar": (round_bar, 20, 0.01),
     "square bar": (square_bar, 20, 0.01),
     "open tube": (lambda n, rng: round_bar(n, rng, ends="open"), 20, 0.01),
-    "short open tube": (lambda n, rng: round_bar(n, rng, 8, ends="open"), 8, 0.01),
-    "pin": (lambda n, rng: round_bar(n, rng, ends="round"), 22, 0.015),
     "short pin": (lambda n, rng: round_bar(n, rng, 8, ends="round"), 10, 0.015),
     "flat bar": (lambda n, rng: square_bar(n, rng, wide=2.0), 20, 0.01),
     "cone": (cone, 10, 0.06),  # hardly any points are near the apex
@@ -55,23 +53,16 @@ def drawn(name, n, noise, seed=0):
     return points + noise * np.linalg.norm(np.ptp(points, axis=0)) * rng.normal(size=points.shape), length, error
 
 
-@pytest.mark.parametrize("n", [1000, 4000, 12000])
+@pytest.mark.parametrize(("n", "noise"), [(1000, 0), (12000, 0), (4000, 0.005)])
 @pytest.mark.parametrize("name", SHAPES)
-def test_the_length_of_an_object(name, n):
-    points, length, error = drawn(name, n, 0.0)
+def test_the_length_of_an_object(name, n, noise):
+    """Noise of half a percent of the diagonal makes a face somewhat round: it is a tenth of the radius of a bar."""
+    points, length, error = drawn(name, n, noise)
     skeleton = TO_SURFACE(points)
     assert len(skeleton.leaves) == 2
-    assert skeleton.length == pytest.approx(length, rel=error)
-    assert skeleton.vertices[:, 2].max() < points[:, 2].max() + 0.1  # radii; among few points the axis turns a little
-
-
-@pytest.mark.parametrize("name", SHAPES)
-def test_noise_on_a_face_makes_it_somewhat_round(name):
-    """Half a percent of the diagonal is a tenth of the radius of a bar, and lengths have it in addition."""
-    points, length, error = drawn(name, 4000, 0.005)
-    skeleton = TO_SURFACE(points)
-    assert len(skeleton.leaves) == 2
-    assert skeleton.length == pytest.approx(length, rel=error + 0.005)
+    assert skeleton.length == pytest.approx(length, rel=error + noise)
+    # among few points the axis turns a little
+    assert noise or skeleton.vertices[:, 2].max() < points[:, 2].max() + 0.1
 
 
 def test_all_but_the_ends_is_as_it_was():
@@ -79,6 +70,4 @@ def test_all_but_the_ends_is_as_it_was():
     inside, outside = pipelines.default()(points), TO_SURFACE(points)
     assert inside.length == pytest.approx(19, rel=0.01)
     middle = [skeleton.vertices[np.abs(skeleton.vertices[:, 2] - 10) < 7] for skeleton in (inside, outside)]
-    middle = [places[np.argsort(places[:, 2])] for places in middle]
-    np.testing.assert_array_equal(*middle)
-    np.testing.assert_array_equal(pipelines.default().with_options(ends="medial")(points).vertices, inside.vertices)
+    np.testing.assert_array_equal(*(places[np.argsort(places[:, 2])] for places in middle))

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import glsk_o3d as glsk
-from glsk_o3d import InvalidParameterError, Tracer, pipelines, samples
+from glsk_o3d import InvalidParameterError, Tracer, pipelines
 from glsk_o3d.analysis import branch_table
-from glsk_o3d.samples.capsules import union_sample
 
 RNG = np.random.default_rng(3)
 ROOT, FORK = np.zeros(3), np.array([0, 0, 1.0])
@@ -87,26 +86,10 @@ def test_roots(sparse, root, place):
     assert (skeleton.n_components, skeleton.n_loops) == (1, 0)
 
 
-@pytest.mark.slow
-def test_the_thickest_end_of_a_sparse_tree_is_that_of_the_trunk():
-    skeleton = pipelines.tree("thickest")(samples.tree(2048, forks=5).points)
-    assert np.linalg.norm(skeleton.vertices[0]) < 0.15
-
-
-def test_a_point_is_kept_as_text_that_a_recipe_can_hold():
-    assert Tracer(root=(0.1, 2, np.float32(3))) == Tracer(root="0.1,2.0,3.0")
-
-
 @pytest.mark.parametrize("root", ["up", "1,2", "1,2,nan", 3, (1, 2), ("a", "b", "c"), [[1], [2, 3], 4]])
 def test_no_root(root):
     with pytest.raises(InvalidParameterError, match="a point such as"):
         Tracer(root=root).check()
-
-
-def test_what_floats_far_away_is_no_part(sparse):
-    skeleton = pipelines.tree()(np.concatenate([sparse, [[4, 4, 4], [-4, 4, 0]]]))
-    assert len(skeleton.leaves) == 3
-    assert (skeleton.vertex_of_point >= 0).all()
 
 
 def test_gaps_are_joined_and_told(sparse):
@@ -128,17 +111,6 @@ def test_a_ring_of_points_stays_a_loop():
     assert (tree.n_components, tree.n_loops, len(tree.leaves)) == (1, 0, 2)
 
 
-def test_a_frame_of_thin_bars_keeps_its_loops():
-    """Of which some show no surface: paths from one root would open them."""
-    corner = np.array(list(np.ndindex(3, 3, 3)), float)
-    edges = np.array([(i, j) for i in range(27) for j in range(i) if np.abs(corner[i] - corner[j]).sum() == 1])
-    nodes, radii = np.concatenate([corner, corner]), np.repeat([0.05, 0.2], 27)
-    frame = glsk.skeletonize(union_sample("frame", nodes, edges, radii, 4000, 0.0, 0).points)
-    assert (frame.n_components, frame.n_loops, len(frame.leaves), len(frame.junctions)) == (1, 28, 0, 27)
-    tree = pipelines.tree("z")(frame.points)
-    assert (tree.n_components, tree.n_loops) == (1, 0)
-
-
 def test_a_trunk_with_a_surface_stays_what_it_was():
     cloud = np.concatenate([tube(1500), scattered([(ROOT, FORK), *TWIGS[1:]], 700)])
     before = pipelines.default().with_options({"Tracer.surface": 0})(cloud)
@@ -153,27 +125,10 @@ def test_a_trunk_with_a_surface_stays_what_it_was():
     assert kept == {tuple(place) for place in skeleton.vertices[trunk].tolist()}
 
 
-@pytest.mark.parametrize(
-    "cloud",
-    [
-        samples.torus(2000).points,
-        samples.y_junction(600).points,
-        np.column_stack([RNG.random((2000, 2)), np.zeros(2000)]),
-        RNG.random((2000, 3)),
-    ],
-    ids=["torus", "y", "sheet", "filled"],
-)
-def test_surfaces_sheets_and_clouds_are_not_traced(cloud):
+@pytest.mark.parametrize("thick", [0, 1])
+def test_sheets_and_clouds_are_not_traced(thick):
+    cloud = np.random.default_rng(3).random((2000, 3)) * [1, 1, thick]
     assert pipelines.default()(cloud).report.n_traced == 0
-
-
-@pytest.mark.slow
-def test_a_large_cloud_has_the_surface_that_its_points_show():
-    """Of a sample of a few ten thousand the twigs would look thinner than their points are apart."""
-    drawn = samples.tree(30_000, forks=5, seed=4, noise=0.0005)
-    found = pipelines.default()(drawn.points)
-    assert found.report.n_traced == 0
-    assert len(found.leaves) == 2**5 + 1
 
 
 def test_without_points_a_graph_becomes_a_tree():

@@ -6,7 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glsk_o3d import Skeleton
-from glsk_o3d.curve.merging import merge_vertices
 
 
 def slow(skeleton, by_degree):
@@ -68,15 +67,3 @@ def test_a_triangle_with_a_tail(refine, collapse, merged):
     skeleton = refine(kite, collapse=collapse)
     assert len(skeleton.vertices) == 3
     np.testing.assert_allclose(skeleton.vertices[skeleton.vertex_of_point[0]], merged)
-
-
-def test_a_vertex_alone_keeps_every_bit():
-    """What was found out about it is known by them."""
-    vertices = np.random.default_rng(0).normal(size=(60, 3))
-    owner = np.repeat(np.arange(60), 7)
-    edges, normals = np.column_stack([np.arange(59), np.arange(1, 60)]), np.tile([0.0, 0.0, 1.0], (len(owner), 1))
-    given = Skeleton(vertices, edges, vertices[:, 0] ** 2, owner, vertices[owner], normals)
-    merged = merge_vertices(given, np.r_[0, 0, np.arange(1, 59)])
-    np.testing.assert_array_equal(merged.vertices[1:], vertices[2:])
-    np.testing.assert_array_equal(merged.radii[1:], given.radii[2:])
-    np.testing.assert_allclose(merged.vertices[0], vertices[:2].mean(axis=0))

@@ -5,7 +5,6 @@ import dataclasses
 import json
 import re
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import pytest
 
@@ -46,11 +45,6 @@ def test_an_entry_of_another_type_is_refused_or_means_the_same(report, name):
             assert json.dumps(again) in (json.dumps(value), "{}", "[]")
 
 
-def test_places_on_a_map_keep_their_digits():
-    told = Decision("loop", (450123.456789, 5600321.987654, -0.0123456), 0.5, changed=False).question
-    assert told == "the loop at (450123.46, 5600321.99, -0.01235) is a handle"
-
-
 def test_print_says_the_main_things_in_about_ten_lines():
     report = Report(
         n_input=900,
@@ -75,21 +69,9 @@ def test_print_says_the_main_things_in_about_ten_lines():
     assert eval(repr(report.decisions)) == report.decisions
 
 
-@pytest.mark.parametrize(
-    ("counts", "sampled"),
-    [((0, 0, 0), False), ((10, 0, 10), False), ((10, 2, 8), False), ((10, 0, 0), False), ((10, 0, 4), True)],
-)
-def test_sampled_only_where_a_cloud_was_large(counts, sampled):
-    n, dropped, kept = counts
-    assert Report(n_input=n, n_dropped=dropped, n_sampled=kept).is_sampled is sampled
-
-
 @dataclass(frozen=True, kw_only=True)
-class Doubt(Filter[Contraction]):
+class Doubt(Filter[Contraction, Contraction]):
     """A filter of somebody else's that warns."""
-
-    consumes: ClassVar[type] = Contraction
-    produces: ClassVar[type] = Contraction
 
     def run(self, given, context):
         return replace(given, report=given.report.with_warning("doubtful: so it is"))

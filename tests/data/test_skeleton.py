@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glsk_o3d import InvalidParameterError, Skeleton
-from glsk_o3d.data.skeleton import NOT_MEASURED
 
 
 def skeleton_of(m, edges):
@@ -56,69 +55,50 @@ def test_hand_made_graphs(which):
 @given(st.integers(1, 14), st.sets(st.tuples(st.integers(0, 13), st.integers(0, 13))))
 def test_random_graphs_against_networkx(m, edges):
     edges = {(a, b) for a, b in edges if a < b < m}
-    skeleton = skeleton_of(m, edges)
-    graph = nx.Graph()
+    skeleton, graph = skeleton_of(m, edges), nx.Graph()
     graph.add_nodes_from(range(m))
     graph.add_edges_from(edges)
-    degree = [graph.degree[i] for i in range(m)]
-    assert skeleton.degree.tolist() == degree
-    assert skeleton.leaves.tolist() == [i for i in range(m) if degree[i] == 1]
-    assert skeleton.junctions.tolist() == [i for i in range(m) if degree[i] > 2]
+    degree = np.array([graph.degree[i] for i in range(m)])
+    np.testing.assert_array_equal(skeleton.degree, degree)
+    np.testing.assert_array_equal(skeleton.leaves, np.flatnonzero(degree == 1))
+    np.testing.assert_array_equal(skeleton.junctions, np.flatnonzero(degree > 2))
     assert skeleton.n_components == nx.number_connected_components(graph)
     assert skeleton.n_loops == len(nx.cycle_basis(graph))
     for part in nx.connected_components(graph):
         assert len({skeleton.component_of_vertex[i] for i in part}) == 1
-
-    covered = []
-    for branch in skeleton.branches:
-        covered += [tuple(sorted(edge)) for edge in path(branch.tolist())]
-        assert all(degree[i] == 2 for i in branch[1:-1])
-        ends = {int(branch[0]), int(branch[-1])}
-        assert all(degree[i] != 2 for i in ends) or len(ends) == 1
+    covered = [tuple(sorted(edge)) for branch in skeleton.branches for edge in path(branch.tolist())]
     assert sorted(covered) == sorted(edges)  # every edge in one branch, once
-
+    for branch in skeleton.branches:
+        assert (degree[branch[1:-1]] == 2).all()
+        assert branch[0] == branch[-1] or (degree[branch[[0, -1]]] != 2).all()
     back = skeleton.to_networkx()
-    assert set(back.nodes) == set(range(m))
+    assert {*back.nodes} == {*range(m)}
     assert {tuple(sorted(edge)) for edge in back.edges} == edges
-    for i in range(m):
-        facts = dict(back.nodes[i])
-        assert np.isnan(facts.pop("support"))
-        assert facts == {
-            "position": tuple(skeleton.vertices[i]),
-            "radius": skeleton.radii[i],
-            "confidence": skeleton.confidence[i],
-            "half_width": skeleton.half_width[i],
-            "half_thickness": skeleton.half_thickness[i],
-        }
-    total = sum(length for _, _, length in back.edges(data="length"))
-    assert skeleton.length == pytest.approx(total)
+    names = dict(radius="radii", confidence="confidence", half_width="half_width", half_thickness="half_thickness")
+    for word, name in names.items():
+        assert [back.nodes[i][word] for i in range(m)] == getattr(skeleton, name).tolist()
+    assert all(back.nodes[i]["position"] == tuple(skeleton.vertices[i]) for i in range(m))
+    assert skeleton.length == pytest.approx(sum(length for _, _, length in back.edges(data="length")))
 
 
-def test_arrays_are_of_the_promised_kind():
-    skeleton = Skeleton([[0, 0, 0], [3, 4, 0]], [(0, 1)], [1, 2], [0], [[0, 0, 0]], [[0, 0, 1]])
+def test_arrays_are_of_the_promised_kind_and_what_is_unknown_is_filled_in():
+    skeleton = Skeleton([[3, 4, 0], [0, 0, 0]], [(1, 0)], [1, 2], [0], [[0, 0, 0]], [[0, 0, 1]])
     assert skeleton.vertices.dtype == skeleton.radii.dtype == skeleton.points.dtype == np.float64
     assert skeleton.edges.dtype == skeleton.vertex_of_point.dtype == np.int64
-    assert (skeleton.length, skeleton.edge_lengths.tolist()) == (5, [5])
+    assert (skeleton.length, skeleton.edge_lengths.tolist(), skeleton.edges.tolist()) == (5, [5], [[0, 1]])
+    assert np.isnan(skeleton.confidence).all()
+    assert skeleton.half_width.tolist() == skeleton.half_thickness.tolist() == [1, 2]
     with pytest.raises(dataclasses.FrozenInstanceError):
         skeleton.edges = None
     nothing = Skeleton([], [], [], [], [], [])
     assert nothing.edges.shape == (0, 2)
     assert (nothing.n_components, nothing.n_loops, nothing.length, nothing.branches) == (0, 0, 0, ())
-
-
-def test_confidence_and_half_axes_are_those_that_were_measured():
-    """Else no number, and the radius."""
-    plain = Skeleton([[0, 0, 0], [1, 0, 0]], [(0, 1)], [1, 2], [0], [[0, 0, 0]], [[0, 0, 1]])
-    assert np.isnan(plain.confidence).tolist() == [True, True]
-    assert plain.half_width.tolist() == plain.half_thickness.tolist() == [1, 2]
-    measured = dataclasses.replace(plain, confidence=[1, 0.5], half_width=[2, 4], half_thickness=[1, 1])
-    moved = dataclasses.replace(measured, vertices=measured.vertices + 1)
-    assert moved.confidence.tolist() == [1, 0.5]
-    assert (moved.half_width.tolist(), moved.half_thickness.tolist()) == ([2, 4], [1, 1])
-    assert moved.confidence.dtype == moved.half_width.dtype == np.float64
-    one = dataclasses.replace(measured, **NOT_MEASURED, vertices=[[0, 0, 0]], edges=[], radii=[3])
-    assert np.isnan(one.confidence).tolist() == [True]
-    assert one.half_width.tolist() == one.half_thickness.tolist() == [3]
+    bare = Skeleton(LINE["vertices"], [], (), (), LINE["points"], ())
+    assert np.isnan(np.concatenate([bare.radii, bare.half_width, bare.normals.ravel()])).all()
+    assert bare.vertex_of_point.tolist() == bare.representative_of_point.tolist() == [-1] * 3
+    # unknown representatives do not bind the number of points
+    fewer = dataclasses.replace(bare, points=LINE["points"][:2], normals=None, vertex_of_point=None)
+    assert fewer.representative_of_point.tolist() == [-1] * 2
 
 
 LINE = dict(
@@ -150,6 +130,8 @@ LINE = dict(
         ("vertex_of_point", [0, 2], "vertex_of_point: has 2 rows for 3 points"),
         ("vertex_of_point", [0, -2, 3], r"vertex_of_point\[1\] = -2: names a missing vertex"),
         ("vertex_of_point", [0, 1, 1], r"points\[2\] = .*: must be finite, .* as vertex_of_point gives it a vertex"),
+        ("representative_of_point", [0, 1, 3], r"representative_of_point\[2\] = 3: names a missing point"),
+        ("representative_of_point", [0, 1], "representative_of_point: has 2 rows for 3 points"),
         ("normals", [[0, 0, np.inf]] * 3, r"normals\[0\] = .*: must be unit vectors, or NaN"),
         ("confidence", [0, 1.5, 0], r"confidence\[1\] = 1.5: must lie between 0 and 1, or be NaN"),
         ("half_thickness", [1, 1, 2], r"half_thickness\[2\] = 2.0: must be at most half_width"),
@@ -161,12 +143,3 @@ def test_a_skeleton_is_sound_or_it_is_not_made(name, value, message):
     Skeleton(**LINE)
     with pytest.raises(InvalidParameterError, match=message):
         Skeleton(**{**LINE, name: value})
-
-
-def test_what_is_not_known_is_filled_in_and_edges_are_sorted():
-    found = Skeleton(LINE["vertices"], [[2, 1], [1, 0]], (), (), LINE["points"], ())
-    assert found.edges.tolist() == [[0, 1], [1, 2]]
-    assert np.isnan(found.radii).tolist() == np.isnan(found.half_width).tolist() == [True] * 3
-    assert found.vertex_of_point.tolist() == [-1] * 3
-    assert np.isnan(found.normals).all()
-    assert found.normals.shape == (3, 3)

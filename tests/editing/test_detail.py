@@ -18,7 +18,6 @@ from glsk_o3d import (
 )
 from glsk_o3d.data.decisions import Decision
 from glsk_o3d.data.skeleton import Skeleton
-from glsk_o3d.samples import torus, y_junction
 from glsk_o3d.samples.capsules import union_sample
 
 
@@ -81,43 +80,6 @@ def test_all_and_none_and_back(seed):
     assert kept >= {it.place for it in judged if it.probability >= 0.75}
 
 
-def test_what_leads_to_limbs_is_one():
-    """A neck with a muzzle and two horns, each rather probable, goes last, and the muzzle or a horn with it."""
-    nodes = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [2, 1, 0], [1, 0, 2], [1, 0, 2.5], [1, 0.5, 2], [1, -0.5, 2]]
-    edges = [(0, 1), (1, 2), (0, 3), (2, 4), (1, 5), (5, 6), (5, 7), (5, 8)]
-    plain = Skeleton(nodes, edges, np.full(9, 0.2), (), (), ())
-    chances = {6: 0.9, 7: 0.8, 8: 0.7, 3: 0.97, 4: 0.98}
-    judged = tuple(Decision("limb", tuple(map(float, nodes[v])), chance, False) for v, chance in chances.items())
-    animal = replace(plain, report=replace(plain.report, decisions=judged))
-    tips = {
-        limb: {*map(tuple, (it := editing.detailed(animal, limb=limb)).vertices[it.leaves])} for limb in (0.75, 0.95)
-    }
-    assert tips[0.75] == {tuple(nodes[v]) for v in (3, 4, 6, 7)}
-    assert tips[0.95] == {tuple(nodes[v]) for v in (3, 4, 6)}
-
-
-def test_a_branch_comes_back_to_the_part_that_it_left():
-    """Not to a thinner one that is as near."""
-    nodes = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [0.9, 0.3, 0], [0.6, 0.6, 0]]
-    plain = Skeleton(nodes, [(0, 1), (1, 2), (1, 3), (3, 4)], [0.4, 0.4, 0.4, 0.1, 0.1], (), (), ())
-    curve = ((0.95, 0.18, 0.0), (1.0, 0.2, 1.0))
-    gone = Decision("limb", curve[-1], 0.2, True, curve, (0.1, 0.1))
-    back = editing.detailed(replace(plain, report=replace(plain.report, decisions=(gone,))), limb=0.1)
-    assert [1, 5] in back.edges.tolist()
-
-
-def test_without_radii_nothing_comes_back():
-    """Nobody knows then what was near."""
-    turn = np.linspace(0, 2 * np.pi, 9)[:-1]
-    ring = Skeleton(
-        np.column_stack([np.cos(turn), np.sin(turn), 0 * turn]), [(k, (k + 1) % 8) for k in range(8)], (), (), (), ()
-    )
-    curve = ((1.0, 0.01, 0.0), (2.0, 0.0, 0.0))
-    gone = Decision("limb", curve[-1], 0.2, True, curve, (0.1, 0.1))
-    given = replace(ring, report=replace(ring.report, decisions=(gone,)))
-    assert editing.detailed(given, limb=0) is given
-
-
 def test_a_root_stays():
     tree = pipelines.tree()(samples.tree(4000, forks=3).points)
     bare = editing.detailed(tree, limb=1)
@@ -165,24 +127,6 @@ def test_files_keep_it(stout, tmp_path):
         read = read_skeleton(tmp_path / name)
         assert read.report.decisions == stout.report.decisions
         assert same(editing.detailed(read, limb=0), editing.detailed(stout, limb=0))
-
-
-def test_what_nobody_asked_about_stays():
-    ring, junction = skeletonize(torus(1000).points), skeletonize(y_junction(1500).points)
-    assert same(editing.detailed(ring, limb=1), ring)
-    unasked = skeletonize(y_junction(1500).points, limb=0)
-    for skeleton in (unasked, replace(junction, report=replace(junction.report, decisions=()))):
-        for limb in (0, 1):
-            assert same(editing.detailed(skeleton, limb=limb), skeleton)
-
-
-def test_limbs_alike_are_judged_one_by_one(stout):
-    """Also if their probabilities are the same number."""
-    alike = [
-        replace(it, probability=0.6) if it.about == "limb" else it for it in stout.report.decisions if not it.changed
-    ]
-    skeleton = replace(stout, report=replace(stout.report, decisions=tuple(alike)))
-    assert len(editing.detailed(skeleton, limb=0.7).leaves) == 2
 
 
 @pytest.mark.parametrize("limb", [-0.1, 1.5, np.nan, "much"])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.distance import cdist
 
-from glsk_o3d import Connector, Contractor, LPRReducer, Pipeline, RingBuilder, Sampler, Skeleton, pipelines, samples
+from glsk_o3d import Connector, Contractor, LPRReducer, RingBuilder, Sampler, Skeleton, pipelines, samples
 
 VARIANTS = {
     name: next(stage for stage in make().stages if isinstance(stage, Connector))
@@ -51,17 +51,6 @@ def test_vertices_are_the_weighted_means_of_their_points_and_rings_join_them(sta
     assert (skeleton.degree > 0).all()
 
 
-@pytest.mark.parametrize(("frame", "share"), [("box", 2), ("spread", 5)])
-def test_percentages_and_units_agree(frame, share):
-    sample = samples.y_junction(n=800).points * 250
-    state = Contractor(max_iterations=3)((Sampler(frame=frame) | RingBuilder())(sample))
-    # of the box with the spread of the points: a^2 / 12 is the variance of one side, evenly filled
-    diagonal = np.linalg.norm(np.ptp(sample, axis=0) if frame == "box" else np.sqrt(12) * sample.std(axis=0))
-    a, b = (replace(ONE_RADIUS, radius=radius)(state) for radius in (f"{share}%", share / 100 * diagonal))
-    np.testing.assert_array_equal(a.vertices, b.vertices)
-    np.testing.assert_array_equal(a.edges, b.edges)
-
-
 def test_balls_of_one_radius_cover_and_keep_apart():
     state = contracted(samples.y_junction(n=800).points)
     sizes = []
@@ -90,9 +79,3 @@ def test_surface_is_told_by_what_had_a_ring_and_by_noise():
     np.testing.assert_array_equal(told, np.union1d(begun.point_of_survivor, spoilt))
     assert (told < 6000).sum() < 4000 < 6000
     assert np.isin(told, Connector()(state).supporting_points).all()
-
-
-def test_every_point_tells_of_the_surface_where_none_is_thinned():
-    skeleton = Pipeline(*pipelines.wen2024().stages[:-1])(samples.torus(n=3000).points)
-    assert "surface_points" in vars(skeleton)
-    np.testing.assert_array_equal(skeleton.surface_points, np.arange(3000))

@@ -6,30 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glsk_o3d import Denoiser, OutlierRemover, RingBuilder, Sampler, samples
-from glsk_o3d.data.points import CLEAN_SPHERICITY, NOISE_SPHERICITY, noise_share
-from glsk_o3d.filters.denoiser import RIDGE_NEIGHBOURS, subspace_mean_shift, to_ridges
-from glsk_o3d.geometry.neighbourhoods import nearest_neighbours, principal
+from glsk_o3d.data.points import noise_share
+from glsk_o3d.filters.denoiser import subspace_mean_shift, to_ridges
 
 PREPARED = Sampler() | OutlierRemover() | Denoiser()
 
 TURN = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
-
-
-def noise_of(points, k=16):
-    neighbours = nearest_neighbours(points, k)[1]
-    return noise_share(principal(points, neighbours)[0], neighbours)
-
-
-def cylinder(noise, n=1200, seed=0):
-    """Of radius 1 along x."""
-    rng = np.random.default_rng(seed)
-    angle = rng.uniform(0, 2 * np.pi, n)
-    surface = np.column_stack([rng.uniform(-2, 2, n), np.cos(angle), np.sin(angle)])
-    return surface + noise * rng.normal(size=(n, 3))
-
-
-def from_surface(points):
-    return np.abs(np.hypot(points[:, 1], points[:, 2]) - 1)[np.abs(points[:, 0]) < 1.5].mean()
 
 
 def thread(noise=0.2, n=400):
@@ -37,9 +19,6 @@ def thread(noise=0.2, n=400):
     rng = np.random.default_rng(2)
     x = rng.uniform(-5, 5, n)
     return np.column_stack([x, 0 * x, 0 * x]) + noise * rng.normal(size=(n, 3))
-
-
-# ---- how far they are noise
 
 
 @settings(max_examples=30)
@@ -50,28 +29,8 @@ def test_noise_share_by_its_definition(seed, n, k):
     spread[:: n // 2 + 1] = 0  # points in one place
     ratio = [s[0] / s[2] if s[2] else 0.0 for s in spread]
     middle = np.array([np.median([ratio[j] for j in row]) for row in neighbours])
-    expected = np.interp(middle, [CLEAN_SPHERICITY, NOISE_SPHERICITY], [0, 1])
+    expected = np.interp(middle, [0.2, 0.35], [0, 1])
     np.testing.assert_allclose(noise_share(spread, neighbours), expected, atol=1e-12)
-
-
-def test_a_ball_is_noise_and_a_surface_is_none():
-    assert np.median(noise_of(np.random.default_rng(0).normal(size=(1000, 3)))) > 0.8
-    assert noise_of(cylinder(0)).max() == 0
-    # and in between it grows with the noise
-    grown = [noise_of(cylinder(noise)).mean() for noise in (0.05, 0.1, 0.2, 0.4)]
-    assert (np.diff(grown) > 0).all()
-
-
-# ---- subspace-constrained mean shift
-
-
-def test_points_of_a_noisy_cylinder_come_nearer_to_it():
-    points = cylinder(0.2)
-    moved = subspace_mean_shift(points, noise_of(points), 4)
-    assert from_surface(moved) < 0.6 * from_surface(points)
-    # on it, not in it
-    radius = np.hypot(moved[:, 1], moved[:, 2])[np.abs(moved[:, 0]) < 1.5]
-    assert np.mean(radius) == pytest.approx(1, abs=0.05)
 
 
 @pytest.mark.parametrize("share", [1, 0.25])
@@ -81,15 +40,12 @@ def test_one_pass_by_its_definition(share):
     moved = subspace_mean_shift(points, np.full(60, share), 1)
     for x, after in zip(points, moved, strict=True):
         distance = np.linalg.norm(points - x, axis=1)
-        near = points[np.argsort(distance)[:RIDGE_NEIGHBOURS]]
-        squared = np.sort(distance)[:RIDGE_NEIGHBOURS] ** 2
+        near = points[np.argsort(distance)[:32]]
+        squared = np.sort(distance)[:32] ** 2
         weight = np.exp(-squared / (2 * squared.mean()))
         way = np.average(near, axis=0, weights=weight) - x
         along = np.linalg.eigh(np.cov(near, rowvar=False, aweights=weight))[1][:, 2]
         np.testing.assert_allclose(after, x + share * (way - along * (along @ way)), atol=1e-10)
-
-
-# ---- the filter
 
 
 def in_order(points):
@@ -118,9 +74,6 @@ def test_clean_clouds_are_not_denoised(points):
     np.testing.assert_array_equal(denoised.neighbours, plain.neighbours)
 
 
-# ---- averaging where noise is wider than neighbourhoods
-
-
 @pytest.mark.slow
 def test_dense_noisy_clouds_are_averaged():
     """Neighbourhoods as wide as those of 4096 to 8192 points, and less noise in them the more points there are."""
@@ -137,13 +90,6 @@ def test_dense_noisy_clouds_are_averaged():
         return np.hypot(np.hypot(x, y) - 0.4, z).std()
 
     assert off(in_order(state)) < 0.8 * off(in_order(alone))
-    # a pass that finds no more than pairs counts, too, and so does one in a cloud that is clean elsewhere
-    clean = samples.tube(20000, radius=0.05).points + [0, 0, 5]
-    for points, most in (
-        (samples.torus(10000, noise=noise).points, 8192),
-        (np.concatenate([sample.points, clean]), 34000),
-    ):
-        assert len((PREPARED | RingBuilder())(points).cloud) < most
     # every point has its place near it
     away = np.linalg.norm(in_order(state) - sample.points, axis=1)
     assert np.quantile(away, 0.99) < 6 * noise * np.linalg.norm(np.ptp(sample.points, axis=0))

@@ -80,12 +80,6 @@ def test_between_two_faces_points_go_to_the_middle():
     np.testing.assert_array_equal(Inscriber(share=0)(state).positions, state.positions)
 
 
-def test_a_single_flat_face_stays():
-    points = np.random.default_rng(0).random((2000, 3)) * [1, 1, 0]
-    state = RingBuilder()(points)
-    np.testing.assert_array_equal(Inscriber()(state).positions, state.positions)
-
-
 @pytest.mark.parametrize("size", [1e-60, 1.0, 1e60])
 def test_it_turns_and_scales_with_the_cloud(size):
     points, rng = samples.y_junction(1500).points, np.random.default_rng(0)

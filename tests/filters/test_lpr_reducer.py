@@ -1,14 +1,12 @@
 """LPRReducer: energies, pairs, rings and bookkeeping."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glsk_o3d import Contractor, LPRReducer, RingBuilder, StageError, samples
-from glsk_o3d.filters.lpr_reducer import combine_rings, match, merge_energy
+from glsk_o3d.filters.lpr_reducer import match, merge_energy
 
 CLOUDS = {
     "torus": samples.torus(n=600).points,
@@ -46,9 +44,6 @@ def test_runs_alone_as_a_filter_after_a_contraction():
     assert reduced.report.stages == tuple(map(repr, pipeline.stages))
 
 
-# ---- the energy
-
-
 def slow_energy(state):
     """Equations 6 to 12, point by point."""
     psi = 1.2 * state.ring_ratio_drop
@@ -69,9 +64,6 @@ def test_energy_against_the_equations(state):
         np.testing.assert_allclose(merge_energy(case), slow_energy(case), rtol=1e-9)
 
 
-# ---- the matching
-
-
 @settings(max_examples=100)
 @given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, 9)).filter(lambda pair: pair[0] != pair[1]), max_size=25))
 def test_matching_is_greedy(pairs):
@@ -85,14 +77,6 @@ def test_matching_is_greedy(pairs):
         else:
             assert taken & set(pair)  # and nothing that came before in the order was left out
     assert chosen == sorted(chosen)
-
-
-def test_mending_leaves_fewer_points_that_nothing_surrounds():
-    broken = [(contracted(CLOUDS["torus"], 6, LPRReducer(mend_rings=on)).rings.sizes < 3).sum() for on in (False, True)]
-    assert broken[1] < broken[0]
-
-
-# ---- the pass
 
 
 @pytest.mark.parametrize("reducer", VARIANTS, ids=repr)
@@ -127,25 +111,3 @@ def test_bookkeeping_of_a_pass(state, reducer):
     np.testing.assert_array_equal(after.ring_size0, s0)
     np.testing.assert_array_equal(after.ring_size, s)
     assert (after.rings.indices != after.rings.centres).all()  # nobody surrounds itself
-
-
-@pytest.mark.parametrize("reducer", VARIANTS, ids=repr)
-def test_cheapest_first_does_not_depend_on_the_order_of_the_points(reducer):
-    """By index does, as in the published code."""
-    points = CLOUDS["torus"]
-    order = np.random.default_rng(0).permutation(len(points))
-    straight, shuffled = (reducer(contracted(cloud)) for cloud in (points, points[order]))
-    same = set(straight.point_of_survivor.tolist()) == set(order[shuffled.point_of_survivor].tolist())
-    assert same == (reducer.order == "cheapest")
-
-
-def test_rings_of_flat_parts_are_those_of_their_plane():
-    """What is left of Laplacian coordinates there is rounding, and leads anywhere."""
-    rng = np.random.default_rng(0)
-    state = contracted(np.column_stack([rng.uniform(-1, 1, (400, 2)), np.zeros(400)]))
-    state = replace(state, laplacian_coordinates=1e-15 * rng.normal(size=state.positions.shape))
-    tilted = replace(state, laplacian_coordinates=1e-15 * rng.normal(size=state.positions.shape))
-    pairs = np.array([0]), state.rings[0][:1]
-    for case in (state, tilted):
-        known = replace(case, laplacian_coordinates=case.normals)
-        np.testing.assert_array_equal(combine_rings(case, *pairs)[0], combine_rings(known, *pairs)[0])

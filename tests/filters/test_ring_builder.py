@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay, cKDTree
 
-from glsk_o3d import Contraction, InvalidParameterError, RingBuilder, samples
+from glsk_o3d import InvalidParameterError, RingBuilder, samples
 from glsk_o3d.data.points import default_k
 from glsk_o3d.filters.ring_builder import published_k
 from glsk_o3d.geometry.neighbourhoods import nearest_neighbours
@@ -53,26 +53,6 @@ def test_rings_are_delaunay_stars_in_the_principal_plane(points, k):
         following = ring[1:] + (ring[:1] if state.rings.closed[i] else [])
         assert {frozenset(pair) for pair in zip(ring, following, strict=False)} == opposite
         assert state.rings.closed[i] == (0 not in triangulation.convex_hull)
-
-
-def test_state_says_what_it_is():
-    state = RingBuilder()(TORUS)
-    np.testing.assert_allclose(np.sort(state.to_point_cloud().points, axis=0), np.sort(TORUS, axis=0), atol=1e-15)
-    n = len(TORUS)
-    assert isinstance(state, Contraction)
-    assert len(state) == state.report.n_input == state.report.n_distinct == n
-    np.testing.assert_array_equal(state.points, TORUS)
-    np.testing.assert_array_equal(state.survivor_of_point, state.representative_of_point)
-    np.testing.assert_array_equal(state.representative_of_point[state.point_of_survivor], np.arange(n))
-    np.testing.assert_array_equal(state.mass, 1)
-    assert state.ring_ratio == 1
-    distance = np.linalg.norm(state.cloud[state.rings.indices] - state.cloud[state.rings.centres], axis=1)
-    np.testing.assert_allclose(state.ring_size, [d.min() for d in np.split(distance, state.rings.indptr[1:-1])])
-    edges = np.mean([d.mean() for d in np.split(distance, state.rings.indptr[1:-1])])
-    assert state.mean_ring_edge == pytest.approx(edges, rel=1e-12)
-    assert state.report.iterations == ()
-    assert "not contracted" in state.report.stop_reason
-    assert list(state.report.seconds) == ["RingBuilder"]
 
 
 def test_order_place_size_and_rotation_do_not_matter():

@@ -1,13 +1,10 @@
 """Sampler: cloud -> points."""
 
 import dataclasses
-import json
-from itertools import pairwise
 
 import numpy as np
 import open3d as o3d
 import pytest
-from typer.testing import CliRunner
 
 import glsk_o3d as glsk
 from glsk_o3d import (
@@ -25,7 +22,6 @@ from glsk_o3d import (
 )
 from glsk_o3d.analysis import Gripper, grasp_candidates
 from glsk_o3d.analysis.support import with_support
-from glsk_o3d.cli.main import app
 
 TORUS = samples.torus(n=600).points
 
@@ -64,43 +60,8 @@ def test_a_large_cloud_is_sampled_and_every_point_has_its_place():
     np.testing.assert_array_equal(np.isfinite(skeleton.normals[:, 0]), state.sampled)
 
 
-# -------------------------------------------------------------------------------------------------------------- meshes
-
-CORNERS = np.array([[0, 0, 0], [0, 0, 20], [15, 0, 20], [15, 12, 20.0]])
-"""The axis of a pipe of three straight pieces, 47 long."""
-
-
-def pipe(sides=24, radius=0.8):
-    """As CAD has it: triangles as long as its pieces, mitred where these meet, and flat ends."""
-    angle = 2 * np.pi * np.arange(sides) / sides
-    ways = np.diff(CORNERS, axis=0)
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-    rings = [CORNERS[0] + radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)]
-    for way, mitre, corner in zip(ways, [*(ways[:-1] + ways[1:]), ways[-1]], CORNERS[1:], strict=True):
-        rings.append(rings[-1] + np.outer((corner - rings[-1]) @ mitre / (way @ mitre), way))
-    here, beside = np.arange(sides), (np.arange(sides) + 1) % sides
-    faces = [
-        *(
-            np.stack(face, axis=1) + start
-            for start in (0, sides, 2 * sides)
-            for face in ((here, beside, beside + sides), (here, beside + sides, here + sides))
-        ),
-        *(np.stack([0 * here[2:], here[1:-1], here[2:]], axis=1) + start for start in (0, 3 * sides)),
-    ]
-    vectors, corners = o3d.utility.Vector3dVector, o3d.utility.Vector3iVector
-    return o3d.geometry.TriangleMesh(vectors(np.concatenate(rings)), corners(np.concatenate(faces)))
-
-
-PIPE = pipe()
-
-
-def from_axis(places):
-    """Distances of places from the axis of the pipe."""
-    away = []
-    for a, b in pairwise(CORNERS):
-        t = np.clip((places - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
-        away.append(np.linalg.norm(places - a - t[:, None] * (b - a), axis=1))
-    return np.min(away, axis=0)
+PIPE = o3d.geometry.TriangleMesh.create_cylinder(0.8, 47, resolution=24, split=1)
+"""As CAD has it: triangles as long as the pipe, along z, and flat ends."""
 
 
 @pytest.fixture(scope="module")
@@ -110,13 +71,11 @@ def axis():
 
 def test_a_mesh_of_long_triangles_is_sampled_by_area(axis):
     assert (axis.n_components, axis.n_loops, len(axis.leaves)) == (1, 0, 2)
-    assert abs(axis.length - 47) < 1.6  # it cuts two corners
-    assert np.median(from_axis(axis.vertices)) < 0.02
+    assert abs(axis.length - 47) < 1.6
+    assert np.median(np.hypot(*axis.vertices[:, :2].T)) < 0.02
     assert np.median(np.abs(axis.radii - 0.8)) < 0.02
     assert (axis.report.n_input, axis.report.n_by_area) == (len(PIPE.vertices), 25000)
     assert "25000 by area" in str(axis.report)
-    assert "25000 by area" in axis.report._repr_html_()
-    assert axis.report.to_dict()["n_by_area"] == 25000
 
 
 def test_labels_are_those_of_the_vertices_of_the_mesh(axis):
@@ -141,44 +100,22 @@ def test_the_parts_of_a_pipeline_one_after_another_know_the_sample(axis):
     same(glsk.Tracer()(Refiner()(raw)), axis)
 
 
-def test_every_door_samples_it(axis, tmp_path):
+def test_files_tensors_and_batches_sample_it(axis, tmp_path):
     tensor = o3d.t.geometry.TriangleMesh.from_legacy(PIPE, o3d.core.float64)
     same(glsk.skeletonize(tensor), axis)
-    for ending in ("ply", "obj"):
-        path = tmp_path / f"pipe.{ending}"
-        text = [f"v {x!r} {y!r} {z!r}" for x, y, z in np.asarray(PIPE.vertices).tolist()]
-        text += [f"f {a} {b} {c}" for a, b, c in (np.asarray(PIPE.triangles) + 1).tolist()]
-        path.write_text("\n".join(text))
-        if ending == "ply":
-            o3d.t.io.write_triangle_mesh(str(path), tensor)
-        cloud = glsk.read_cloud(path)
-        assert len(cloud.points) == 25000
-        assert cloud.has_normals()
-        assert abs(glsk.skeletonize(cloud).length - 47) < 1.6
-        assert len(glsk.read_sample(path).point.positions) == 25000
-    result = glsk.batch.run_batch([tmp_path / "pipe.ply"], tmp_path / "out", workers=1)
-    (row,) = result.rows.values()
+    path = tmp_path / "pipe.ply"
+    o3d.t.io.write_triangle_mesh(str(path), tensor)
+    for choice, n in ((700, 700), ("vertices", len(PIPE.vertices)), ("auto", 25000)):
+        cloud = glsk.read_cloud(path, sample=choice)
+        assert len(cloud.points) == n
+    assert cloud.has_normals()
+    assert abs(glsk.skeletonize(cloud).length - 47) < 1.6
+    with pytest.raises(glsk.InvalidParameterError, match="sample"):
+        glsk.read_cloud(path, sample="all")
+    assert len(glsk.read_tensor_cloud(path, sample=700).point.positions) == 700
+    (row,) = glsk.batch.run_batch([path], tmp_path / "out", workers=1).rows.values()
     assert row["by_area"] == 25000
     np.testing.assert_allclose(row["length"], axis.length)
-    with glsk.batch.Skeletonizer(workers=1) as skeletonizer:
-        for skeleton in skeletonizer.stream([PIPE]):
-            same(skeleton, axis)
-    meshes = pytest.importorskip("pymeshlab") and glsk.MeshSet()
-    meshes.add_points(PIPE)
-    found = meshes.generate_curve_skeleton_glsk()
-    np.testing.assert_allclose(found["length"], axis.length)
-    meshes.set_current_mesh(0)
-    meshes.generate_segmented_cloud_glsk()
-    assert meshes.current_mesh().vertex_number() == len(PIPE.vertices)
-    assert meshes.current_mesh().face_number() == len(PIPE.triangles)
-
-
-@pytest.mark.parametrize("name", ["tree", "wen2024", "cao2010"])
-def test_every_pipeline_samples_it(name):
-    skeleton = glsk.skeletonize(PIPE, name, sample=4096)
-    assert skeleton.report.n_by_area == 4096
-    assert skeleton.n_components == 1
-    assert abs(skeleton.length - 47) < 2
 
 
 def test_the_choice_of_a_sample():
@@ -200,22 +137,15 @@ def test_vertices_that_are_not_finite_and_corners_that_are_missing():
     vertices = np.append(np.asarray(PIPE.vertices), [[np.nan] * 3, [3, 0, 0]], axis=0)
     triangles = np.append(np.asarray(PIPE.triangles), [[0, 1, len(vertices) - 2]], axis=0)
     mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(vertices), o3d.utility.Vector3iVector(triangles))
-    with pytest.raises(glsk.InvalidCloudError, match="96"):
+    with pytest.raises(glsk.InvalidCloudError, match="index 50"):
         glsk.skeletonize(mesh)
     skeleton = glsk.skeletonize(mesh, drop_invalid=True, sample=4096)
     assert (skeleton.report.n_dropped, skeleton.report.n_by_area) == (1, 4096)
     assert (skeleton.vertex_of_point >= 0).tolist() == np.isfinite(vertices).all(axis=1).tolist()
     for corner in (-1, len(vertices)):
         mesh.triangles = o3d.utility.Vector3iVector(np.append(triangles, [[0, 1, corner]], axis=0))
-        with pytest.raises(glsk.InvalidCloudError, match="none of the 98 vertices"):
+        with pytest.raises(glsk.InvalidCloudError, match="none of the 52 vertices"):
             glsk.skeletonize(mesh)
-
-
-def test_samples_of_a_sampled_mesh_support_its_skeleton():
-    skeleton = glsk.support(PIPE, draws=2, sample=4096)
-    assert skeleton.report.n_agreeing == 2
-    assert skeleton.support.min() == 1
-    assert len(skeleton.whole.points) == len(PIPE.vertices) + 4096
 
 
 def test_files_keep_the_sample_of_a_mesh(tmp_path, axis):
@@ -228,24 +158,19 @@ def test_files_keep_the_sample_of_a_mesh(tmp_path, axis):
         same(Refiner()(known), Refiner()(axis))
 
 
-def test_edits_and_measures_of_a_mesh_keep_to_its_sample(tmp_path):
+def test_edits_of_a_mesh_keep_to_its_sample():
     bar = o3d.geometry.TriangleMesh.create_cylinder(0.1, 3, resolution=20, split=1).translate([0, 0, 1.5])
     stem = glsk.skeletonize(bar, "tree")
-    for edited in (
+    edits = (
         glsk.editing.reroot(stem, "-z"),
         glsk.editing.simplify(stem, tolerance=0.01),
-        glsk.editing.prune(stem, length=0.1, order=0),
-        glsk.editing.largest_component(stem),
         glsk.editing.cut_loops(stem)[0],
-    ):
+    )
+    for edited in edits:
         assert not edited.lacks_sample
         assert len(edited.vertex_of_point) == len(bar.vertices)
         assert edited.whole.vertex_of_point.max() < len(edited.vertices)
     assert abs(glsk.analysis.tree_measures(stem).stem_diameter - 0.2) < 0.005
-    assert abs(glsk.analysis.cylinders(stem).volume.sum() / (np.pi * 0.1**2 * 3) - 1) < 0.05
-    glsk.save_skeleton(stem, tmp_path / "stem.json")
-    told = CliRunner().invoke(app, ["evaluate", str(tmp_path / "stem.json"), "--json"])
-    assert json.loads(told.stdout)["assessment"]["topology"] == 1
 
 
 def test_a_changed_skeleton_of_a_sampled_mesh_says_what_it_lacks(axis):
@@ -261,27 +186,10 @@ def test_a_changed_skeleton_of_a_sampled_mesh_says_what_it_lacks(axis):
             ask()
 
 
-def test_a_sample_by_area_of_a_cloud_is_told_from_one_of_a_mesh(tmp_path):
-    points = np.asarray(PIPE.vertices)
+def test_a_cloud_has_no_triangles_to_sample():
     with pytest.warns(glsk.SkeletonWarning, match=r"Sampler\.sample = 500: the cloud has no triangles"):
-        skeleton = glsk.skeletonize(np.repeat(points, 2, axis=0) + np.linspace(0, 0.1, 192)[:, None], sample=500)
+        skeleton = glsk.skeletonize(TORUS, sample=500)
     assert skeleton.report.n_by_area == 0
-    o3d.io.write_triangle_mesh(str(tmp_path / "pipe.ply"), PIPE)
-    for choice, n in ((700, 700), ("vertices", len(points)), ("auto", 25000)):
-        assert len(glsk.read_cloud(tmp_path / "pipe.ply", sample=choice).points) == n
-    assert len(glsk.read_tensor_cloud(tmp_path / "pipe.ply", sample=700).point.positions) == 700
-    with pytest.raises(glsk.InvalidParameterError, match="sample"):
-        glsk.read_cloud(tmp_path / "pipe.ply", sample="all")
-
-
-def test_what_is_measured_on_the_surface_takes_the_sample(axis, tmp_path):
-    found = glsk.analysis.assess(axis, PIPE)
-    assert min(found.centredness, found.boundedness, found.topology) > 0.95
-    grasps = grasp_candidates(axis, 4.0)
-    glsk.save_skeleton(axis, tmp_path / "s.json")
-    read = glsk.read_skeleton(tmp_path / "s.json")
-    for cloud in (None, PIPE):
-        assert len(grasp_candidates(read, 4.0, cloud=cloud)) == len(grasps) > 0
 
 
 def test_a_scene_of_meshes_is_sampled_before_it_is_cut_into_tiles(tmp_path):

@@ -15,27 +15,13 @@ def records(**columns):
 
 
 @pytest.mark.parametrize(
-    ("rule", "changes", "stops_after"),
+    ("rule", "values", "stops_after"),
     [
         (ExplainedScore(), [0.5, 0.001, 0.5, 0.5, 0.03, 0.019, 0.001], 6),
         (ExplainedScore(), [0.0, 0.0, 0.0, 0.0], 4),
         (ExplainedScore(), [0.5, 0.5, 0.5, 0.03], None),
         (ExplainedScore(0.1), [0.5, 0.09, 0.5, 0.2, 0.09], 5),
         (ExplainedScore(min_iterations=1), [0.019], 1),
-    ],
-)
-def test_explained_score(rule, changes, stops_after):
-    history = records(explained_change=changes)
-    reasons = [rule(history[: i + 1]) for i in range(len(history))]
-    stops = [i + 1 for i, reason in enumerate(reasons) if reason is not None]
-    assert stops[:1] == ([] if stops_after is None else [stops_after])
-    for reason in filter(None, reasons):
-        assert f"< {rule.threshold:g}" in reason
-
-
-@pytest.mark.parametrize(
-    ("rule", "ratios", "stops_after"),
-    [
         (RingSizeRatio(), [0.6, 0.4, 0.3, 0.2901], 4),
         (RingSizeRatio(), [0.995], 1),  # the uncontracted cloud has 1
         (RingSizeRatio(), [0.98, 0.5], None),
@@ -44,7 +30,8 @@ def test_explained_score(rule, changes, stops_after):
         (RingSizeRatio(0.25), [0.5, 0.251], 2),
     ],
 )
-def test_ring_size_ratio(rule, ratios, stops_after):
-    history = records(ring_ratio=ratios)
+def test_stopping_rules(rule, values, stops_after):
+    name = "explained_change" if isinstance(rule, ExplainedScore) else "ring_ratio"
+    history = records(**{name: values})
     stops = [i + 1 for i in range(len(history)) if rule(history[: i + 1]) is not None]
     assert stops[:1] == ([] if stops_after is None else [stops_after])

@@ -15,9 +15,7 @@ from glsk_o3d import (
     Thinner,
     samples,
 )
-from glsk_o3d.filters.denoiser import MOST_IN_ONE, average_noisy
-from glsk_o3d.filters.thinner import ENOUGH, default_size, spacing_enough, thin, thin_nearer
-from glsk_o3d.geometry.grid_sampling import sample_grid
+from glsk_o3d.filters.thinner import default_size, spacing_enough, thin, thin_nearer
 from glsk_o3d.geometry.neighbourhoods import nearest_neighbours, principal
 
 
@@ -52,9 +50,6 @@ def test_nearest_pairs_go_first():
         assert (into[merged:10] == np.arange(merged, 10)).all()
 
 
-# ---- where there are more than enough
-
-
 def evened(points, around):
     neighbours = nearest_neighbours(points, 16)[1]
     apart = spacing_enough(points, neighbours, principal(points, neighbours)[0], around)
@@ -78,54 +73,6 @@ def test_dense_tubes_are_merged_as_far_as_allowed_and_sparse_ones_stay(noise):
         else:
             assert len(left(into)) > 0.7 * n
             assert (np.linalg.norm(points - points[into], axis=1) < spacing).all()
-
-
-def test_a_plane_has_its_share_of_the_points_that_are_enough():
-    """No part of it is thin, so that only their number says how far apart they may be."""
-    points = np.column_stack([np.random.default_rng(0).uniform(0, 1, (9000, 2)), np.zeros(9000)])
-    assert len(left(evened(points, 20)[0])) == pytest.approx(ENOUGH, rel=0.1)
-
-
-# ---- on a grid
-
-
-@pytest.mark.parametrize("n", [100, 700])
-def test_a_grid_keeps_about_so_many_each_the_nearest_to_the_middle_of_its_cell(surface, n):
-    kept, into, counts = sample_grid(surface, n)
-    np.testing.assert_array_equal(counts, np.bincount(into))
-    assert 0.6 * n < len(kept) < 1.7 * n
-    np.testing.assert_array_equal(into[kept], np.arange(len(kept)))
-    for cell in range(len(kept)):
-        members = np.flatnonzero(into == cell)
-        away = np.linalg.norm(surface[members] - surface[members].mean(axis=0), axis=1)
-        assert away[members == kept[cell]] <= away.min() * (1 + 1e-12)
-    # cells are cubes of one size, anywhere along the axes
-    spans = [np.ptp(surface[into == cell], axis=0).max() for cell in range(len(kept))]
-    assert max(spans) < 3 * np.ptp(surface, axis=0).max() / np.sqrt(n)
-
-
-# ---- averaging
-
-
-def test_means_of_noisy_points(surface):
-    rng, n = np.random.default_rng(0), 300
-    near = nearest_neighbours(surface, 16)[1]
-    noise = np.where(surface[:, 0] > 0, rng.uniform(0.1, 1, 3000), 0)
-    weight = rng.uniform(1, 9, 3000)
-    into, mean, total = average_noisy(surface, near, noise, weight, n)
-    size = np.bincount(into)
-    assert size.max() == np.floor(min(MOST_IN_ONE, np.count_nonzero(noise) / n))
-    assert n <= len(np.unique(into[noise > 0])) < np.count_nonzero(noise) / 1.5
-    np.testing.assert_allclose(total, np.bincount(into, weight), rtol=1e-12)
-    for group in (0, len(mean) // 2, int(np.argmax(size))):
-        rows = np.flatnonzero(into == group)
-        np.testing.assert_allclose(mean[group], np.average(surface[rows], axis=0, weights=weight[rows]), rtol=1e-12)
-    clean = noise == 0
-    assert (size[into[clean]] == 1).all()
-    np.testing.assert_allclose(mean[into[clean]], surface[clean], rtol=1e-15)
-
-
-# ---- the filter
 
 
 @pytest.mark.parametrize(
@@ -156,15 +103,3 @@ def test_thinned_clouds_keep_all_points_and_their_mass():
     skeleton = (Contractor(reducer=LPRReducer()) | Connector() | Refiner())(state)
     assert len(skeleton.vertex_of_point) == 2000
     assert skeleton.n_loops == 1
-
-
-def test_thin_parts_keep_their_points():
-    """A thick and a thin tube, equally dense: the thick one is merged, the thin one stays."""
-    thick, thin_ = samples.tube(9000, radius=0.3, length=1.5).points, samples.tube(600, radius=0.02, length=1.5).points
-    state = Thinner()(np.concatenate([thick, thin_ + [0, 1, 0]]))
-    kept = state.point_of_survivor
-    assert (kept < 9000).sum() < 0.5 * 9000
-    assert (kept >= 9000).sum() > 0.7 * 600  # not those that are nearer than a twentieth of the way around
-    gone = np.setdiff1d(np.arange(9000, 9600), kept) - 9000
-    nearest = np.linalg.norm(thin_[gone, None] - thin_[kept[kept >= 9000] - 9000], axis=2).min(axis=1)
-    assert np.quantile(nearest, 0.8) < np.sqrt(2 * np.pi * 0.02 * 1.5 / 600)  # their spacing

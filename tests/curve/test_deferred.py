@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glsk_o3d import Refiner, Skeleton, Tracer, pipelines, samples, skeletonize
-from glsk_o3d.curve.thin.deferred import Aside
+from glsk_o3d import Refiner, Skeleton, Tracer, samples, skeletonize
+from glsk_o3d.curve.curve import Curve
+from glsk_o3d.curve.thin.deferred import Deferred
 
 pytestmark = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
 ALL = ("vertices", "radii", "confidence", "half_width", "half_thickness", "support")
@@ -32,18 +33,12 @@ def test_a_crown_is_set_aside_and_the_trunk_is_not(crown):
     assert 60 < len(refined.leaves) < 75  # 65 of the tree
 
 
-def test_it_makes_no_difference_to_what_a_tree_is(crown, monkeypatch):
-    monkeypatch.setattr(Aside, "of", lambda *_: None)
-    whole = skeletonize(crown[0].points)
-    assert abs(len(whole.leaves) - len(crown[0].leaves)) < 5
-    assert abs(whole.length / crown[0].length - 1) < 0.02
-    trunk = [s.radii[np.argmin(s.vertices[:, 2])] for s in (whole, crown[0])]
-    np.testing.assert_allclose(*trunk, rtol=0.05)
-
-
 def test_it_comes_back_as_it_was(crown):
     _, aside = crown
-    whole, back = aside.whole, aside.put_back(aside.rest())
+    whole, rest = aside.whole, aside.rest()
+    back = aside.put_back(rest)
+    assert rest.vertex_of_point.max() < len(rest.vertices) == (~aside.gone).sum()
+    np.testing.assert_array_equal(rest.points, whole.points[aside.rows])
     order = np.concatenate([np.flatnonzero(~aside.gone), np.flatnonzero(aside.gone)])
     for name in ALL:
         np.testing.assert_array_equal(getattr(back, name), getattr(whole, name)[order])
@@ -55,15 +50,6 @@ def test_it_comes_back_as_it_was(crown):
     lost = len(whole.edges) - len(edges)
     assert lost <= whole.n_loops  # of what was set aside only a forest is left
     assert back.n_components == whole.n_components
-
-
-def test_the_rest_has_its_own_points(crown):
-    _, aside = crown
-    rest = aside.rest()
-    assert len(rest.points) == len(aside.rows) == (~aside.gone[aside.whole.vertex_of_point]).sum()
-    np.testing.assert_array_equal(rest.points, aside.whole.points[aside.rows])
-    assert rest.vertex_of_point.min() == 0
-    assert rest.vertex_of_point.max() < len(rest.vertices) == (~aside.gone).sum()
 
 
 def grid(n):
@@ -81,14 +67,11 @@ def grid(n):
     return Skeleton(vertices, edges, zeros + 0.1, vertex, points, normals, confidence=zeros)
 
 
-def test_what_is_mostly_on_loops_is_not_set_aside():
+def test_what_is_small_or_mostly_on_loops_is_not_set_aside():
     net = grid(24)
-    assert Aside.of(net, 0.65) is None
-    assert Aside.of(comb(), 0.65).gone.all()
-
-
-def test_small_skeletons_are_not_set_aside():
-    assert Aside.of(comb(12), 0.65) is None
+    assert Deferred.of(Curve.of(net), 0.65) is None
+    assert Deferred.of(Curve.of(comb(12)), 0.65) is None
+    assert Deferred.of(Curve.of(comb()), 0.65).gone.all()
 
 
 def comb(n=24, more=()):
@@ -100,13 +83,13 @@ def comb(n=24, more=()):
 
 def seen(monkeypatch):
     """What is set aside from now on."""
-    found, look = [], Aside.of
+    found, look = [], Deferred.of
 
     def watch(*args):
         found.append(look(*args))
         return found[-1]
 
-    monkeypatch.setattr(Aside, "of", watch)
+    monkeypatch.setattr(Deferred, "of", watch)
     return found
 
 
@@ -119,63 +102,18 @@ def test_nothing_may_be_left(monkeypatch):
     assert Tracer()(refined).report.n_traced == len(lines.points)
 
 
-@pytest.mark.parametrize("recentre", [0, 1])
-@pytest.mark.parametrize("edges", [[], [(576, 577)]], ids=["no edges", "no normals"])
-def test_of_what_is_left_nothing_may_be_asked(monkeypatch, recentre, edges):
-    """A vertex that is sure and has no edge, or an edge whose points have no normals."""
-    lines, found, rng = comb(), seen(monkeypatch), np.random.default_rng(0)
-    turn, up = 2 * np.pi * rng.random(1500), rng.random(1500)
-    normals = np.column_stack([np.cos(turn), np.sin(turn), 0 * turn])
-    points = 30 + normals + up[:, None] * [0, 0, 4]
-    more = 2
-    whole = replace(
-        lines,
-        vertices=np.concatenate([lines.vertices, np.full((more, 3), 30.0) + [[0, 0, 1], [0, 0, 3]]]),
-        edges=np.concatenate([lines.edges, np.reshape(edges, (-1, 2)).astype(int)]),
-        points=np.concatenate([lines.points, points]),
-        normals=np.concatenate([lines.normals, np.where(len(edges), np.nan, normals)]),
-        vertex_of_point=np.concatenate([lines.vertex_of_point, 576 + (up > 0.5)]),
-        **{name: np.append(getattr(lines, name), [0.1] * more) for name in ("radii", "half_width", "half_thickness")},
-        confidence=np.append(lines.confidence, [1.0] * more),
-        support=np.full(578, np.nan),
-    )
-    refined = Refiner(recentre=recentre)(whole)
-    assert np.isfinite(refined.vertices).all()
-    assert refined.n_components >= 2
-    if not recentre:
-        assert found[0].gone.sum() == 576
-
-
 def test_points_without_a_vertex_have_none_afterwards():
     lines = comb()
     owner = np.where(np.arange(len(lines.points)) % 7, lines.vertex_of_point, -1)
-    aside = Aside.of(replace(lines, vertex_of_point=owner), 0.65)
+    aside = Deferred.of(Curve.of(replace(lines, vertex_of_point=owner)), 0.65)
     np.testing.assert_array_equal(aside.put_back(aside.rest()).vertex_of_point, owner)
 
 
-def test_a_loop_is_opened_unless_all_are_to_be_kept():
+def test_a_loop_is_opened_unless_all_are_to_be_kept_and_all_can_be_judged(monkeypatch):
     lines = comb(more=[(5 * 24 + 20, 6 * 24 + 20)])
     assert lines.n_loops == 1
     assert Refiner(recentre=0)(lines).n_loops == 0
     assert Refiner(recentre=0, handle=0, limb=0)(lines).n_loops == 1
-
-
-def test_a_crown_does_not_hang_on_the_order_of_points(crown):
-    refined, _ = crown
-    order = np.random.default_rng(0).permutation(len(refined.points))
-    again = skeletonize(refined.points[order])
-    for name in ("vertices", "edges", "radii"):
-        np.testing.assert_array_equal(getattr(again, name), getattr(refined, name))
-    np.testing.assert_array_equal(again.vertex_of_point, refined.vertex_of_point[order])
-
-
-def test_all_can_be_judged(monkeypatch):
-    monkeypatch.setattr(Aside, "of", lambda *_: pytest.fail("asked"))
-    assert len(Refiner(set_aside=False)(comb()).edges)
-
-
-def test_without_questions_nothing_is_set_aside(monkeypatch):
-    monkeypatch.setattr(Aside, "of", lambda *_: pytest.fail("asked"))
-    off = {f"Refiner.{option}": 0 for option in ("handle", "limb", "air", "bridge", "recentre")}
-    skeleton = pipelines.default().with_options(off)(samples.tree(4096, forks=6).points)
-    assert len(skeleton.edges)
+    monkeypatch.setattr(Deferred, "of", lambda *_: pytest.fail("asked"))
+    assert len(Refiner(set_aside=False)(lines).edges)
+    assert len(Refiner(recentre=0, handle=0, limb=0)(lines).edges)
