@@ -9,6 +9,8 @@ from itertools import pairwise
 import numpy as np
 from _clouds import Case
 from glsk_bench.shapes.axis import subdivided
+from glsk_o3d.curve.topology.air import branch_facts
+from glsk_o3d.curve.topology.evidence import Evidence, in_order
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import dijkstra, maximum_bipartite_matching
 from scipy.spatial import cKDTree
@@ -17,8 +19,6 @@ from scipy.spatial.distance import cdist
 from glsk_o3d import Pipeline, Refiner
 from glsk_o3d.analysis import Truth
 from glsk_o3d.analysis.comparison import TIP_REACH
-from glsk_o3d.curve.topology.air import branch_facts
-from glsk_o3d.curve.topology.evidence import Evidence, in_order
 from glsk_o3d.curve.topology.gaps import gap_facts
 from glsk_o3d.curve.topology.loops import loop_facts
 from glsk_o3d.curve.topology.spurs import limb_facts

@@ -96,7 +96,7 @@ def test_bookkeeping_of_a_pass(state, reducer):
     new_representative = after.representative[state.survivors]
     assert np.bincount(new_representative).max() == 2
     # who was owned together stays together
-    np.testing.assert_array_equal(after.representative, new_representative[state.representative])
+    np.testing.assert_array_equal(after.representative, new_representative[state.map.survivor_of_row])
     # every merge joins a point and its nearest ring neighbour, and pays
     swallowed = np.setdiff1d(np.arange(len(state)), at)
     representatives = at[new_representative[swallowed]]
