@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
-from _clouds import Case
 from glsk_bench.shapes.axis import subdivided
 from glsk_o3d.curve.topology.air import branch_facts
 from glsk_o3d.curve.topology.evidence import Evidence, in_order
@@ -25,6 +24,8 @@ from glsk_o3d.curve.topology.spurs import limb_facts
 from glsk_o3d.data.skeleton import Skeleton
 from glsk_o3d.geometry.cycles import minimum_cycle_basis
 from glsk_o3d.geometry.vectors import norm
+
+from .clouds import Case
 
 DIGITS = 4  # of a fact
 STEP = 0.3  # between places on the true axis, in median radii

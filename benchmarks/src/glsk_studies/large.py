@@ -9,11 +9,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from _clouds import builtin, cases
-from _runs import run
-from _stages import told
-from _stopwatch import MB, fresh_python, peak, reset_peak, resident
-from _tables import Tables, number, short
 
 from glsk_o3d import Skeleton, read_cloud, read_skeleton, save_skeleton, skeletonize
 from glsk_o3d.analysis.curves import distances
@@ -21,6 +16,12 @@ from glsk_o3d.interop.packages import import_open3d, require
 from glsk_o3d.io.formats import ply
 from glsk_o3d.pipelines import default
 from glsk_o3d.samples import sauropod
+
+from .clouds import builtin, cases
+from .runs import run
+from .stages import counts_of
+from .stopwatch import MB, fresh_python, peak, reset_peak, resident
+from .tables import Tables, cells_of, number, short
 
 STEP = 0.001  # between the places of a curve at which `large` measures it, as a share of the diagonal
 HUGE_BLOCK = 1_000_000  # points written at a time
@@ -30,9 +31,8 @@ GB = 1e9
 LAS_STEP = 1e-5  # between coordinates in LAS, in units of the shape, which is one and a half long
 MEASURED = """
 import json, resource, sys
-told, benchmarks, *words = sys.argv[1:]
-sys.path.insert(0, benchmarks)
-from _stopwatch import MB, peak
+told, *words = sys.argv[1:]
+from glsk_studies.stopwatch import MB, peak
 {work}
 used = resource.getrusage(resource.RUSAGE_SELF)
 with open(told, "w") as file:
@@ -46,7 +46,7 @@ LABELS = "from glsk_o3d import annotate_file, read_skeleton; annotate_file(read_
 def spent(work: str, cloud: Path, *words: str | Path) -> dict[str, float]:
     """CPU and wall seconds of work in a process of its own, and the most memory in MB, imports included."""
     told = cloud.with_name("told.json")
-    _, wall = fresh_python(MEASURED.format(work=work), told, Path(__file__).parent, *words)
+    _, wall = fresh_python(MEASURED.format(work=work), told, *words)
     return json.loads(told.read_text()) | dict(file_wall=wall)
 
 
@@ -58,7 +58,7 @@ def once(path: Path, file: bool) -> dict:
     start = time.process_time(), time.perf_counter()
     skeleton = default()(points)
     costs = dict(cpu=time.process_time() - start[0], wall=time.perf_counter() - start[1])
-    facts = costs | dict(peak=(peak() - before) / MB, sampled=skeleton.report.n_sampled) | told(skeleton)
+    facts = costs | dict(peak=(peak() - before) / MB, sampled=skeleton.report.n_sampled) | counts_of(skeleton)
     facts["diagonal"] = float(np.linalg.norm(np.ptp(points, axis=0)))
     curve = Skeleton(skeleton.vertices, skeleton.edges, skeleton.radii, (), (), ())
     save_skeleton(curve, path.with_suffix(".json"))
@@ -109,18 +109,16 @@ def large_tables(rows: list[dict]) -> Tables:
     files = any("file_cpu" in row for row in rows)
     header = ["", "points", "CPU s", "MB", "sampled", "contracted", "vertices", "mean %", "largest %", "loops", "same"]
     header += ["file CPU s", "file wall s", "file MB"] if files else []
-    lines = []
-    for row in rows:
-        if "failure" in row:
-            lines.append([row["shape"], str(row["n"]), *"-" * (len(header) - 2), row["failure"]])
-            continue
+
+    def cells(row):
         counts = [str(row[key]) for key in ("sampled", "contracted", "vertices")]
         away = [number(row.get(key), 2) for key in ("mean", "most")]
         same = {True: "yes", False: "no", None: "-"}[row.get("same_loops")]
-        cells = [short(row["cpu"]), number(row["peak"], 0), *counts, *away, str(row["loops"]), same]
-        if files:
-            cells += [short(row["file_cpu"]), short(row["file_wall"]), number(row["file_peak"], 0)]
-        lines.append([row["shape"], str(row["n"]), *cells, ""])
+        found = [short(row["cpu"]), number(row["peak"], 0), *counts, *away, str(row["loops"]), same]
+        more = [short(row["file_cpu"]), short(row["file_wall"]), number(row["file_peak"], 0)] if files else []
+        return found + more
+
+    lines = cells_of(rows, ["shape", "n"], cells, len(header) - 2)
     return [(f"default, against {min(row['n'] for row in rows)} points", [*header, "note"], lines)]
 
 

@@ -9,10 +9,7 @@ from pathlib import Path
 from statistics import fmean
 
 import numpy as np
-from _peers import PEERS, Graph, Peer, ours, separators_of_points, skeleton_of
-from _qsm import read_cylinder_model
-from _stopwatch import MB, peak, reset_peak, resident
-from _tables import Tables, good, number, pick, short
+import typer
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
@@ -25,6 +22,11 @@ from glsk_o3d.analysis.forestry import BREAST_HEIGHT
 from glsk_o3d.geometry.vectors import dot, norm, unit
 from glsk_o3d.recipes.catalogue import named_pipeline
 from glsk_o3d.samples.capsules import visible
+
+from .cylinder_models import read_cylinder_model
+from .peers import PEERS, Graph, Peer, ours, separators_of_points, skeleton_of
+from .stopwatch import MB, peak, reset_peak, resident
+from .tables import Tables, cells_of, good, grouped, number, pick, short
 
 CONDITIONS = ("clean", "noise", "missing", "uneven")
 SPARSE = dict(n=4096, forks=6)  # tips are 0.4 spacings thick
@@ -66,11 +68,14 @@ class SparseTree:
 
 def upright(up: str) -> np.ndarray:
     """The axes x, y and z, turned round so that the one that points up is the last: (3,) int array."""
+    if up not in ("x", "y", "z"):
+        raise typer.BadParameter(f"--up {up}: there are x, y and z")
     return np.roll(np.arange(3), 2 - "xyz".index(up))
 
 
 def sparse_trees(folder: Path | None, up: str, trees: int) -> list[SparseTree]:
     """The trees of a folder in all their conditions, or so many built-in ones."""
+    upright(up)
     if folder is None:
         return [SparseTree(str(seed), condition) for condition in CONDITIONS for seed in range(trees)]
     found = []
@@ -275,29 +280,25 @@ def measure_curve(tree: SparseTree, tool: Peer) -> dict:
 
 def curve_tables(rows: list[dict]) -> Tables:
     """F1 in every condition at a glance, and then a table for each condition."""
-    conditions, tools = (list(dict.fromkeys(row[key] for row in rows)) for key in ("condition", "tool"))
-    trees = len({row["tree"] for row in rows})
-    lines = []
-    for tool in tools:
-        means = [mean(pick(rows, tool=tool, condition=it)) for it in conditions]
-        here = pick(rows, tool=tool)
+    by_condition, by_tool, lines = grouped(rows, "condition"), grouped(rows, "tool"), []
+    for tool, here in by_tool.items():
+        means = [mean(pick(here, condition=it)) for it in by_condition]
         whole = sum(row.get("components") == 1 and row.get("loops") == 0 for row in here)
         clean = [number(means[0][key], 2) for key in ("accuracy", "completeness", "tips", "cpu")]
         cells = [*(number(it["f1"], 2) for it in means), f"{whole}/{len(here)}", *clean]
         lines.append([TOOLS[tool].label, *cells, failed(here)])
-    header = ["", *conditions, "one tree", "accuracy %", "completeness %", "tips", "CPU s", "failed"]
-    found = [(f"F1 of {trees} sparse trees, and more of the {conditions[0]} ones", header, lines)]
+    header = ["", *by_condition, "one tree", "accuracy %", "completeness %", "tips", "CPU s", "failed"]
+    first, trees = next(iter(by_condition)), len(grouped(rows, "tree"))
+    tables = [(f"F1 of {trees} sparse trees, and more of the {first} ones", header, lines)]
     header = ["", "f1", "precision", "recall", "accuracy %", "completeness %", "components", "loops", "tips", "failed"]
-    for condition in conditions:
+    digits = dict(f1=2, precision=2, recall=2, accuracy=2, completeness=2, components=1, loops=1, tips=2)
+    for condition, those in by_condition.items():
         lines = []
-        for tool in tools:
-            here = pick(rows, tool=tool, condition=condition)
+        for tool, here in grouped(those, "tool").items():
             it = mean(here)
-            shares = [number(it[key], 2) for key in ("f1", "precision", "recall", "accuracy", "completeness")]
-            counts = [number(it[key], 1) for key in ("components", "loops")]
-            lines.append([TOOLS[tool].label, *shares, *counts, number(it["tips"], 2), failed(here)])
-        found.append((condition, header, lines))
-    return found
+            lines.append([TOOLS[tool].label, *(number(it[key], n) for key, n in digits.items()), failed(here)])
+        tables.append((condition, header, lines))
+    return tables
 
 
 def mean(rows: list[dict]) -> dict[str, float]:
@@ -347,13 +348,13 @@ def measure_model(cloud: Path, model: Path, unit: float) -> dict:
 
 def model_tables(rows: list[dict]) -> Tables:
     """A line for each tree: ours and theirs."""
-    lines = []
-    for row in rows:
-        if "failure" in row:
-            lines.append([row["tree"], *"-" * 6, row["failure"]])
-            continue
-        pairs = [f"{it:.3g}" for name in ("height", "stem_diameter", "volume") for it in row[name]]
-        lines.append([row["tree"], *pairs, "; ".join(row["doubts"])])
+
+    def cells(row):
+        return [f"{it:.3g}" for name in ("height", "stem_diameter", "volume") for it in row[name]]
+
+    lines = cells_of(rows, ["tree"], cells, 6)
+    for line, row in zip(lines, rows, strict=True):
+        line[-1] = line[-1] or "; ".join(row["doubts"])
     header = ["", "height m", "theirs", "stem m", "theirs", "volume m3", "theirs", "doubts"]
     return [("Scanned trees, and cylinder models of them", header, lines)]
 
@@ -361,26 +362,23 @@ def model_tables(rows: list[dict]) -> Tables:
 def stem_tables(rows: list[dict]) -> Tables:
     """Good diameters and volumes by seeds and scanners; and a line for each tree."""
     lines = []
-    for seeds in dict.fromkeys(row["seeds"] for row in rows):
-        here = pick(rows, seeds=seeds)
+    for seeds, here in grouped(rows, "seeds").items():
         sets = [(f"{seeds} seeds, {n} scanner{'s' * (n > 1)}", pick(good(here), scanners=n)) for n in (1, 2, 3)]
         for label, some in (*sets, (f"{seeds} seeds, all", good(here))):
             if some:
                 lines.append([label, *_stem_cells(some)])
+
+    def cells(row):
+        stem = [f"{100 * row[it]:.2f}" for it in ("true_diameter", "stem_diameter")]
+        wood = [f"{row[it]:.3f}" for it in ("true_volume", "volume")]
+        return [str(row["scanners"]), *stem, f"{row['stem_arc']:.0f}", *wood]
+
     header = ["", "trees", "within 3 %", "median error %", "volume: median error %"]
-    found = [("Stem diameters at 1.3 m, and volumes, of scanned trees", header, lines)]
-    lines = []
-    for row in rows:
-        cells = [row["seeds"], str(row["tree"])]
-        if "failure" in row:
-            lines.append([*cells, *"-" * 6, row["failure"]])
-            continue
-        stem = (row["true_diameter"], row["stem_diameter"])
-        cells += [str(row["scanners"]), *(f"{100 * it:.2f}" for it in stem), f"{row['stem_arc']:.0f}"]
-        cells += [f"{row['true_volume']:.3f}", f"{row['volume']:.3f}", ""]
-        lines.append(cells)
-    header = ["seeds", "tree", "scanners", "true cm", "found cm", "arc", "true m3", "found m3", "note"]
-    return [*found, ("Each tree", header, lines)]
+    heads = ["seeds", "tree", "scanners", "true cm", "found cm", "arc", "true m3", "found m3", "note"]
+    return [
+        ("Stem diameters at 1.3 m, and volumes, of scanned trees", header, lines),
+        ("Each tree", heads, cells_of(rows, ["seeds", "tree"], cells, 6)),
+    ]
 
 
 def _stem_cells(rows):
@@ -396,8 +394,7 @@ def _stem_cells(rows):
 def measure_tables(rows: list[dict]) -> Tables:
     """The median error of each measure, its quartiles, and the worst."""
     lines = []
-    for condition in dict.fromkeys(row["condition"] for row in rows):
-        here = pick(rows, condition=condition)
+    for condition, here in grouped(rows, "condition").items():
         known = good(here)
         for name in TREE_MEASURES if known else ():
             errors = 100 * np.array([row[name] for row in known])
@@ -425,14 +422,10 @@ def once(path: Path, pipeline: str) -> dict:
 
 def large_tables(rows: list[dict]) -> Tables:
     """A line for each size and pipeline."""
-    lines = []
-    for row in rows:
-        if "failure" in row:
-            lines.append([row["pipeline"], str(row["n"]), *"-" * 7, row["failure"]])
-            continue
-        counts = [str(row[key]) for key in ("components", "loops", "tips", "traced")]
-        lines.append(
-            [row["pipeline"], str(row["n"]), *(short(row[key]) for key in ("cpu", "wall", "peak")), *counts, ""]
-        )
+
+    def cells(row):
+        costs = [short(row[key]) for key in ("cpu", "wall", "peak")]
+        return [*costs, *(str(row[key]) for key in ("components", "loops", "tips", "traced"))]
+
     header = ["", "points", "CPU s", "wall s", "MB", "components", "loops", "tips", "traced", "note"]
-    return [("Lidar scans of one tree", header, lines)]
+    return [("Lidar scans of one tree", header, cells_of(rows, ["pipeline", "n"], cells, 7))]

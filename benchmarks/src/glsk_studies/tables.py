@@ -24,13 +24,13 @@ from glsk_o3d.data.report import Report
 from glsk_o3d.interop.atomic import write_atomically
 from glsk_o3d.viewing.figures import INK, save_figure
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[3]
 Table = tuple[str, list[str], list[list[str]]]  # title, header, lines
 Tables = list[Table]
 # columns that are not numbers, besides the first
 TEXT = {"pipeline", "setting", "takes", "worst", "wrong", "note", "now right", "now wrong"}
 TEXT |= {"measure", "to", "why", "which", "failed", "most in", "packages", "commit"}
-GREY, ORANGE, BLUE = "#777777", "#d95f02", "#1f4e9c"  # told apart by who sees no red or no green, and in print
+GREY, ORANGE, BLUE = "#777777", "#d95f02", "#1f4e9c"  # distinct without red and green, and in print
 LOOKS = {"default": dict(color=BLUE, marker="o"), "wen2024": dict(color=ORANGE, marker="^")}
 LOOKS |= {"cao2010": dict(color=GREY, marker="s")}
 WIDTH = 5.0  # inches: narrow enough for a telephone
@@ -52,21 +52,18 @@ def good(rows: list[dict]) -> list[dict]:
 
 
 def summary(rows: list[dict]) -> dict:
-    """Means over the shapes that gave a skeleton, and how many are right; a failure is not."""
+    """Means over the shapes that gave a skeleton, and how many have the right topology; a failure has not."""
     names = ("error", "inside", "completeness", "length", "ends", "radius_error", "tips_f1", "junctions_f1", "cpu")
     values = {name: [row[name] for row in good(rows) if row[name] is not None] for name in names}
     counts = dict(n=len(rows), right=sum(bool(row["topology"]) for row in good(rows)))
-    return counts | {name: fmean(found) if found else float("nan") for name, found in values.items()}
-
-
-# --------------------------------------------------------------------------------------------------------------- files
+    return counts | {name: fmean(known) if known else float("nan") for name, known in values.items()}
 
 
 def save(path: Path | None, rows: list[dict]) -> None:
     """Write all rows, with where they come from, as JSON."""
     if path is not None:
-        told = {"command": sys.argv[1:], **surroundings(), "rows": rows}
-        path.write_text(json.dumps(told, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        content = {"command": sys.argv[1:], **surroundings(), "rows": rows}
+        path.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -75,9 +72,9 @@ def read(path: Path) -> dict[str, Any]:
     return json.loads(gzip.decompress(data) if path.suffix == ".gz" else data)
 
 
-def write_packed(path: Path, told: dict[str, Any]) -> None:
+def write_packed(path: Path, content: dict[str, Any]) -> None:
     """Write packed JSON: the same bytes for the same content."""
-    packed = gzip.compress(json.dumps(told, ensure_ascii=False).encode(), mtime=0)
+    packed = gzip.compress(json.dumps(content, ensure_ascii=False).encode(), mtime=0)
     write_atomically(path, lambda temporary: Path(temporary).write_bytes(packed))
 
 
@@ -102,15 +99,12 @@ def surroundings() -> dict[str, Any]:
 
 def machine() -> str:
     """A line that says where and what was measured."""
-    told = surroundings()
-    it, versions = told["machine"], ", ".join(f"{name} {version}" for name, version in told["versions"].items())
+    facts = surroundings()
+    it, versions = facts["machine"], ", ".join(f"{name} {version}" for name, version in facts["versions"].items())
     return (
         f"Measured on {it['processor']}, {it['cores']} cores, {it['memory_gb']} GB, load {it['load']}, {it['system']}; "
-        f"{versions}; commit {told['commit']}; one thread."
+        f"{versions}; commit {facts['commit']}; one thread."
     )
-
-
-# -------------------------------------------------------------------------------------------------------------- tables
 
 
 def number(value: float | None, digits: int = 3) -> str:
@@ -121,6 +115,15 @@ def number(value: float | None, digits: int = 3) -> str:
 def short(value: float) -> str:
     """Three digits, but not more than two decimals."""
     return f"{value:.{0 if value >= 100 else 1 if value >= 10 else 2}f}"
+
+
+def cells_of(rows: list[dict], names: list[str], cells: Callable[[dict], list[str]], count: int) -> list[list[str]]:
+    """A line for each row: its `names`, so many cells, and a note; of a failure dashes, and its reason."""
+    lines = []
+    for row in rows:
+        found = ["-"] * count if "failure" in row else cells(row)
+        lines.append([*(str(row[name]) for name in names), *found, row.get("failure", "")])
+    return lines
 
 
 def present(tables: Tables, markdown: bool, where: str = "") -> None:
@@ -143,7 +146,7 @@ def present(tables: Tables, markdown: bool, where: str = "") -> None:
 
 
 def markdown_table(title: str, header: list[str], rows: list[list[str]]) -> str:
-    """The same in Markdown."""
+    """A table in Markdown."""
     line = ["--:" if _is_number(place, name) else "---" for place, name in enumerate(header)]
     lines = ["| " + " | ".join(cells) + " |" for cells in (header, line, *rows)]
     return "\n".join([f"**{title}**", "", *lines, ""])
@@ -180,29 +183,6 @@ def page_with(*parts: str) -> Callable[[Path | None], Path | None]:
     return checked
 
 
-def publish(
-    rows: list[dict],
-    make: Callable[[list[dict]], Tables],
-    output: Path | None,
-    markdown: bool,
-    where: str = "",
-    page: Path | None = None,
-    part: str = "",
-    shown: int | None = None,
-) -> Tables:
-    """Save rows, print the tables that are made of them, and put so many into a part of a page; gives the tables."""
-    save(output, rows)
-    tables = make(rows)
-    present(tables, markdown, where)
-    if page is not None:
-        told = tables[:shown]
-        fill(page, {part: "\n".join([where, "", *(markdown_table(*it) for it in told)]) if where else told})
-    return tables
-
-
-# ------------------------------------------------------------------------------------------------------------ pictures
-
-
 def look(name: str) -> dict:
     """Colour and mark of a pipeline."""
     return LOOKS.get(name, dict(color=INK, marker="D"))
@@ -230,8 +210,6 @@ def plain_log(axis) -> None:
     axis.set_minor_locator(NullLocator())
 
 
-def keep(figure, folder: Path, name: str) -> Path:
-    """Write NAME.png into the folder; gives its path."""
-    path = folder / f"{name}.png"
-    save_figure(figure, path)
-    return path
+def keep(figure, folder: Path, name: str) -> None:
+    """Write NAME.png into the folder."""
+    save_figure(figure, folder / f"{name}.png")

@@ -1,76 +1,39 @@
-"""What every stage and the whole cost over the size of the cloud, and how they grow; and skeletons per second."""
+"""What every stage and the whole cost over the size of the cloud, and how they grow."""
 
 from __future__ import annotations
 
-import json
-import os
 import tempfile
-import time
-import warnings
 from collections.abc import Callable, Iterable
 from functools import partial
-from itertools import product
 from pathlib import Path
-from statistics import median
-from unittest.mock import patch
 
 import numpy as np
 import typer
-from _clouds import builtin, cases
-from _runs import PUBLISHED, named, run
-from _stopwatch import (
-    MB,
-    REST,
-    SHARES,
-    STAGES,
-    Stopwatch,
-    find,
-    fresh_python,
-    in_turns,
-    peak,
-    resident,
-    yardstick,
-)
-from _tables import INK, Tables, good, keep, look, number, pick, plain_log, sheet, short
-from glsk_bench.scanning import depth_image, places_at
-from glsk_bench.shapes import shape
 
-from glsk_o3d import Pipeline, SkeletonWarning, skeletonize
-from glsk_o3d.apps.batch import Skeletonizer
-from glsk_o3d.data.skeleton import ARRAYS
-from glsk_o3d.geometry.cores import cores
+from glsk_o3d import Pipeline
+
+from .clouds import cases
+from .runs import PUBLISHED, run
+from .stopwatch import MB, REST, SHARES, STAGES, Stopwatch, find, in_turns, peak, resident, yardstick
+from .tables import INK, Tables, good, keep, look, number, pick, plain_log, sheet, short
 
 MIDDLE = (4096, 65536)  # sizes of the second growth exponent
 COUNTS = ("iterations", "contracted", "vertices")
 GROWTH = f"growth {MIDDLE[0]} to {MIDDLE[1]}"
-COLD = """
-import json, sys, time
-start = time.perf_counter(), time.process_time()
-from glsk_o3d import skeletonize
-imported = time.perf_counter(), time.process_time()
-import numpy
-points = numpy.load(sys.argv[1])
-begun = time.perf_counter(), time.process_time()
-skeletonize(points, sys.argv[2])
-done = time.perf_counter(), time.process_time()
-spent = dict(import_wall=imported[0] - start[0], import_cpu=imported[1] - start[1])
-print(json.dumps(dict(spent, first_wall=done[0] - begun[0], first_cpu=done[1] - begun[1])))
-"""
-"""A fresh process: what the import and the first call take."""
 
 
 def timed(path: Path, pipelines: dict[str, Pipeline], repeat: int) -> dict:
     """The yardstick and the pipelines in turns, on a saved cloud."""
     points = np.load(path)
     tasks = {"1 kNN": partial(yardstick, points)}
-    tasks |= {name: lambda pipeline=pipeline: told(pipeline(points)) for name, pipeline in pipelines.items()}
+    tasks |= {name: lambda pipeline=pipeline: counts_of(pipeline(points)) for name, pipeline in pipelines.items()}
     found = in_turns(tasks, repeat, STAGES)
     _, knn = found.pop("1 kNN")
     knn = {f"knn_{clock}": knn[clock] for clock in ("cpu", "wall")}
     return {name: facts | result | knn for name, (result, facts) in found.items()}
 
 
-def told(skeleton) -> dict:
+def counts_of(skeleton) -> dict:
     """What a table says of a skeleton besides its costs."""
     report = skeleton.report
     counts = dict(contracted=report.n_contracted, iterations=len(report.iterations))
@@ -172,95 +135,6 @@ def stage_table(at: dict[int, list[dict]]) -> tuple[list[str], list[list[str]]]:
         peaks = [row["peak"] if name == "whole" else row["stage_peaks"].get(name, np.nan) for row in at[largest]]
         lines.append([name, *cells, *slopes, number(float(np.median(peaks)), 0)])
     return ["", *map(str, at), "growth", GROWTH, f"MB at {largest}"], lines
-
-
-def first_and_next(path: Path, pipeline: str, repeat: int, threads: int) -> dict:
-    """Medians over fresh processes, and what runs take that follow each other in one."""
-    with patch.dict(os.environ, OMP_NUM_THREADS=str(threads)):  # the package asks at every call
-        found = []
-        for _ in range(repeat):
-            spent, wall = fresh_python(COLD, path, pipeline)
-            found.append(json.loads(spent) | dict(process_wall=wall))
-        cold = {name: median(each[name] for each in found) for name in found[0]}
-        return cold | timed(path, named(pipeline), repeat)[pipeline]
-
-
-def measure_rate(sizes: list[int], pipelines: list[str], shape: str, repeat: int, jobs: int) -> list[dict]:
-    """A row for each size and pipeline, in one thread and in one for each core."""
-    named(",".join(pipelines))
-    with tempfile.TemporaryDirectory() as folder:
-        work = []
-        for n in sizes:
-            path = Path(folder, f"{n}.npy")
-            np.save(path, builtin(shape, f"clean_{n}")[0])
-            facts = dict(measure="rate", n=n, shape=shape)
-            for name, threads in product(pipelines, sorted({1, cores()})):
-                work.append((facts | dict(pipeline=name, threads=threads), (path, name, repeat, threads)))
-        return run(first_and_next, work, min(jobs, 1))
-
-
-def rate_tables(rows: list[dict]) -> Tables:
-    """Cold and warm."""
-    header = ["", "points", "threads", "1 kNN ms", "import ms", "first call ms", "process ms"]
-    header += ["next call ms", "CPU ms", "per second", "first process per second", "note"]
-    lines = []
-    for row in rows:
-        if "failure" in row:
-            lines.append([row["pipeline"], str(row["n"]), str(row["threads"]), *"-" * 8, row["failure"]])
-            continue
-        keys = ("knn_wall", "import_wall", "first_wall", "process_wall", "wall", "cpu")
-        rates = [number(1 / row[key], 1) for key in ("wall", "process_wall")]
-        times = (short(1000 * row[key]) for key in keys)
-        lines.append([row["pipeline"], str(row["n"]), str(row["threads"]), *times, *rates, ""])
-    return [("skeletons per second, wall time", header, lines)]
-
-
-FRAMES, TURN = 30, 60.0  # of a camera, and the degrees that it turns by around the scene meanwhile
-CAMERA_HEIGHT = 20.0  # degrees
-
-
-def frames(family: str, seed: int, n: int) -> list[np.ndarray]:
-    """What a depth camera that turns around a random shape sees, n points a frame."""
-    scene, rng = shape(family, seed), np.random.default_rng(seed)
-    eyes = places_at(np.radians(np.linspace(0, TURN, FRAMES)), np.full(FRAMES, np.radians(CAMERA_HEIGHT)))
-    return [depth_image(scene, eye, n, rng) for eye in eyes]
-
-
-def measure_stream(sizes: list[int], families: list[str], repeat: int) -> list[dict]:
-    """A row for each size, family and number of workers: frames per second, once all processes have begun."""
-    warnings.simplefilter("ignore", SkeletonWarning)
-    rows = []
-    for n, family in product(sizes, families):
-        seen = frames(family, 0, n)
-        knn = in_turns({"1 kNN": partial(yardstick, seen[0])}, repeat)["1 kNN"][1]["wall"]
-        expected = [skeletonize(frame) for frame in seen]
-        for workers in sorted({1, cores()}):
-            spent = []
-            with Skeletonizer(workers=workers) as skeletonizer:
-                list(skeletonizer.stream(seen[: 2 * workers]))
-                for _ in range(repeat):
-                    start = time.perf_counter()
-                    found = list(skeletonizer.stream(seen))
-                    spent.append((time.perf_counter() - start) / FRAMES)
-            same = all(
-                np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True)
-                for one, other in zip(found, expected, strict=True)
-                for name in ARRAYS
-            )
-            facts = dict(measure="stream", n=n, shape=family, workers=workers, same=same)
-            rows.append(facts | dict(knn_wall=knn, wall=median(spent), least=min(spent), most=max(spent)))
-    return rows
-
-
-def stream_tables(rows: list[dict]) -> Tables:
-    """Frames per second of streams."""
-    header = ["scene", "points", "workers", "1 kNN ms", "a frame ms", "frames per second", "least", "most", "same bits"]
-    lines = []
-    for row in rows:
-        rates = [number(1 / row[key], 1) for key in ("wall", "most", "least")]
-        times = (short(1000 * row[key]) for key in ("knn_wall", "wall"))
-        lines.append([row["shape"], str(row["n"]), str(row["workers"]), *times, *rates, "yes" if row["same"] else "no"])
-    return [(f"streams of {FRAMES} depth frames, wall time", header, lines)]
 
 
 def draw_growth(tables: Tables, folder: Path) -> None:

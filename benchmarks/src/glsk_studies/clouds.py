@@ -17,7 +17,6 @@ from zipfile import BadZipFile
 import numpy as np
 import open3d as o3d
 import typer
-from _tables import ROOT
 from glsk_bench import read_folder
 from glsk_bench.folders import INDEX_NAME
 from scipy.spatial import cKDTree
@@ -26,6 +25,8 @@ from glsk_o3d import read_cloud, read_truth, samples
 from glsk_o3d.analysis import Truth
 from glsk_o3d.interop.clouds import cloud_points
 from glsk_o3d.samples.capsules import union_sample
+
+from .tables import ROOT
 
 HOLES = 6  # in a built-in cloud with holes, each of them as far across as the part it is in
 SHOWN = 0.97  # least share of the true axis that a cloud must show for its skeleton to be scored

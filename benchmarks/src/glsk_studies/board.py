@@ -11,17 +11,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import typer
-from _peers import PEERS, skeleton_of
-from _tables import BLUE, ORANGE, ROOT, Table, keep, number, read, sheet, write_packed
 from glsk_bench import BenchmarkFolder, Repeat, Results, read_results
 from glsk_bench.repeating import PLACES
 from glsk_bench.scoring import OF_THINGS, answer_files
 from glsk_bench.table import mean_with_interval, told
 
 from glsk_o3d import plot_skeleton, read_cloud, read_skeleton
-from glsk_o3d.interop.atomic import write_atomically, write_json
+from glsk_o3d.interop.atomic import write_json
 from glsk_o3d.interop.clouds import cloud_points
 from glsk_o3d.recipes.catalogue import named_pipeline
+
+from .peers import PEERS, skeleton_of
+from .tables import BLUE, ORANGE, ROOT, Table, keep, number, read, save_figure, sheet, write_packed
 
 KEPT = ROOT / "benchmarks"  # a folder of it for each version of the benchmark
 DECIMALS = 4  # of what is kept, far more than intervals are wide
@@ -47,9 +48,8 @@ MEASURES = {  # what may be lost, its digits, and whether more of it is better; 
 }
 SHORT = {"clean": "clean", "scan2": "two cameras", "noise1": "1 % noise"}
 NUMBER = re.compile(r"(?<!code )(?<!signal )\d+(?:\.\d+)?")  # of a reason; those of codes and signals are names
-SPREAD = ("moved", "agree", "loops", "ends")  # of several clouds of an object, with intervals
-COLUMNS = 3
 VIEW = (14, -60)  # elevation and azimuth, in degrees
+SPREAD = ("moved", "agree", "loops", "ends")  # of several clouds of an object, with intervals
 
 Seconds = dict[str, dict[str, Any]]
 
@@ -347,25 +347,15 @@ def title(name: str) -> str:
 
 
 def draw_answers(bench: BenchmarkFolder, answers: Path, cloud: str, entries: list[Entry], path: Path) -> None:
-    """The skeletons of a cloud, each with its error and what is wrong with its topology."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-    from PIL import Image
-
+    """The skeletons of a cloud, three in a row, each with its error and what is wrong with its topology."""
     (where,) = (each.path for each in bench.clouds if each.name == cloud)
-    points = cloud_points(read_cloud(where))
-    lines = -(-len(entries) // COLUMNS)
-    figure = Figure((3.4 * COLUMNS, 2.7 * lines), dpi=150, layout="constrained")
-    canvas = FigureCanvasAgg(figure)
-    for i, entry in enumerate(entries):
-        axes = figure.add_subplot(lines, COLUMNS, i + 1, projection="3d")
+    points, lines = cloud_points(read_cloud(where)), -(-len(entries) // 3)
+    figure, _ = sheet(2.7 * lines, lines, 3, width=10.2, subplot_kw=dict(projection="3d"))
+    for axes, entry in zip(figure.axes, entries, strict=False):
         found = answer_files(answers / entry.tool).get(cloud)
         plot_skeleton(read_skeleton(found[0]) if found else None, axes, cloud=points, view=VIEW)
         axes.set_title(caption(entry, cloud), fontsize=9)
-    canvas.draw()
-    pixels = np.asarray(canvas.buffer_rgba())[:, :, :3]
-    image = Image.fromarray(pixels).quantize(32)  # a fifth of the size of a figure's
-    write_atomically(path, lambda temporary: image.save(temporary, "PNG", optimize=True))
+    save_figure(figure, path)
 
 
 def caption(entry: Entry, cloud: str) -> str:

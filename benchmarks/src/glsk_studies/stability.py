@@ -8,9 +8,6 @@ from pathlib import Path
 from statistics import fmean, median
 
 import numpy as np
-from _clouds import Case
-from _runs import with_solves
-from _tables import INK, LOOKS, Tables, good, grouped, keep, number, pick, plain_log, sheet, summary
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
@@ -18,6 +15,10 @@ from glsk_o3d import Contractor, LPRReducer, Pipeline
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.geometry.polylines import nearest_on_edges
 from glsk_o3d.pipelines import rings
+
+from .clouds import Case
+from .runs import with_solves
+from .tables import INK, LOOKS, Tables, cells_of, good, grouped, keep, number, pick, plain_log, sheet, summary
 
 
 def feet(points, nodes, edges):
@@ -32,9 +33,6 @@ def local_radius(axis, points):
     _, edge, part = feet(points, axis.nodes, axis.edges)
     start, end = axis.radii[axis.edges[edge]].T
     return start + (end - start) * part
-
-
-# ---------------------------------------------------------------------------------------------------- number of solves
 
 
 def stops(rows: list[dict]) -> Counter:
@@ -74,9 +72,6 @@ def draw_stop(rows: list[dict], folder: Path) -> None:
     keep(figure, folder, "accuracy_solves")
 
 
-# ----------------------------------------------------------------------------------------------------------- reduction
-
-
 def tracking(case: Case) -> dict:
     """How far reduced contractions are from the one without reduction after as many solves, in local radii."""
     points, axis = case.load()
@@ -96,22 +91,16 @@ def tracking(case: Case) -> dict:
 
 def mass_tables(rows: list[dict]) -> Tables:
     """A table per variant, with the mean over its shapes."""
-    names = ["solves"]
-    names += [f"{kind}_{what}" for kind in ("conserved", "published") for what in ("points", "mean", "hausdorff")]
-    digits = [0 if name == "solves" or name.endswith("points") else 3 for name in names]
+    measures = [f"{kind}_{what}" for kind in ("conserved", "published") for what in ("points", "mean", "hausdorff")]
+    digits = {"solves": 0} | {name: 0 if name.endswith("points") else 3 for name in measures}
+    header = ["shape", *(name.replace("_", " ") for name in digits), "note"]
     tables = []
     for variant, here in grouped(rows, "variant").items():
         if known := good(here):
-            here.append({"shape": "mean"} | {key: fmean(row[key] for row in known) for key in names})
-        lines = []
-        for row in here:
-            cells = [number(row.get(key), n) for key, n in zip(names, digits, strict=True)]
-            lines.append([row["shape"], *cells, row.get("failure", "")])
-        tables.append((variant, ["shape", *(key.replace("_", " ") for key in names), "note"], lines))
+            here.append({"shape": "mean"} | {name: fmean(row[name] for row in known) for name in digits})
+        lines = cells_of(here, ["shape"], lambda row: [number(row[it], n) for it, n in digits.items()], len(digits))
+        tables.append((variant, header, lines))
     return tables
-
-
-# --------------------------------------------------------------------------------------------------------- orientation
 
 
 def turned(case: Case, count: int, pipeline: Pipeline) -> dict:
@@ -135,12 +124,9 @@ def turned(case: Case, count: int, pipeline: Pipeline) -> dict:
 def turn_tables(rows: list[dict]) -> Tables:
     """A table per variant."""
     header = ["shape", "turns", "topology changes", "leaf changes", "median move", "largest move", "note"]
-    tables = []
-    for variant, here in grouped(rows, "variant").items():
-        lines = []
-        for row in here:
-            counts = [str(row.get(key, "-")) for key in ("runs", "topology_changes", "leaf_changes")]
-            moves = [number(of(row["moves"])) if "moves" in row else "-" for of in (median, max)]
-            lines.append([row["shape"], *counts, *moves, row.get("failure", "")])
-        tables.append((variant, header, lines))
-    return tables
+
+    def cells(row):
+        counts = [str(row[key]) for key in ("runs", "topology_changes", "leaf_changes")]
+        return [*counts, *(number(of(row["moves"])) for of in (median, max))]
+
+    return [(name, header, cells_of(here, ["shape"], cells, 5)) for name, here in grouped(rows, "variant").items()]

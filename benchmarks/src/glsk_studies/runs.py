@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 import os
 import signal
 import warnings
@@ -10,7 +12,7 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, get_type_hints
 
 import typer
 from rich.console import Console
@@ -20,6 +22,8 @@ from glsk_o3d import Contractor, Pipeline, pipelines, samples
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.errors import InvalidParameterError
 from glsk_o3d.recipes.catalogue import named_pipeline
+
+from .tables import Tables, fill, machine, markdown_table, page_with, present, save
 
 DEATHS = {it.value: it.name for it in signal.Signals} | {signal.SIGKILL.value: "killed, perhaps for want of memory"}
 PUBLISHED = ("wen2024", "cao2010")
@@ -97,11 +101,8 @@ def _row(work, job):
         return facts | {"failure": f"{type(error).__name__}: {error}"}
 
 
-# ------------------------------------------------------------------------------------------------------------- options
-
-
 def application(text: str | None) -> typer.Typer:
-    """A program of several commands, with its help."""
+    """A program of commands, with its help."""
     return typer.Typer(
         help=text, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None, add_completion=False
     )
@@ -129,6 +130,68 @@ Output = Annotated[
     Path | None, typer.Option("--output", "-o", metavar="JSON", help="Write every result.", callback=writable)
 ]
 Markdown = Annotated[bool, typer.Option("--markdown", help="Print Markdown.")]
+Saved = Annotated[Path, typer.Argument(metavar="JSON", exists=True, dir_okay=False)]
+File = Annotated[Path, typer.Argument(metavar="PAGE", exists=True, dir_okay=False)]
+
+
+def study(
+    app: typer.Typer,
+    tables: Callable[[list[dict]], Tables],
+    part: str | Callable[[dict], str] = "",
+    page_first: bool = False,
+    where: bool = False,
+    shown: int | None = None,
+    name: str | None = None,
+):
+    """A command of a function that gives rows: these are saved, and their tables printed.
+
+    With a part, so many of the tables are also put there into a page: the option --page, or the first argument.
+    """
+
+    def decorate(function):
+        parts = [part] if isinstance(part, str) else []
+        kind = partial(typer.Argument) if page_first else partial(typer.Option, "--page")
+        page = Annotated[Path | None, kind(metavar="PAGE", help="Put tables there.", callback=page_with(*parts))]
+        more = {"output": (Output, None), "markdown": (Markdown, False)} | ({"page": (page, None)} if part else {})
+
+        @functools.wraps(function)
+        def command(page=None, output=None, markdown=False, **options):
+            measured_at = machine() if where else ""  # now, since writing the page changes the working tree
+            chosen = part if isinstance(part, str) else part(options)
+            publish(function(**options), tables, output, markdown, measured_at, page, chosen, shown)
+
+        plain = inspect.Parameter.KEYWORD_ONLY
+        added = [inspect.Parameter(it, plain, default=default, annotation=of) for it, (of, default) in more.items()]
+        given = [each.replace(kind=plain) for each in inspect.signature(function, eval_str=True).parameters.values()]
+        ordered = added[-1:] + given + added[:-1] if page_first else given + added
+        command.__signature__ = inspect.Signature(ordered)
+        del command.__wrapped__
+        command.__annotations__ = get_type_hints(function, include_extras=True) | {
+            it: of for it, (of, _) in more.items()
+        }
+        return app.command(name)(command)
+
+    return decorate
+
+
+def publish(
+    rows: list[dict],
+    make: Callable[[list[dict]], Tables],
+    output: Path | None,
+    markdown: bool,
+    where: str = "",
+    page: Path | None = None,
+    part: str = "",
+    shown: int | None = None,
+) -> Tables:
+    """Save rows, print the tables that are made of them, and put so many into a part of a page; gives the tables."""
+    save(output, rows)
+    tables = make(rows)
+    present(tables, markdown, where)
+    if page is not None:
+        chosen = tables[:shown]
+        fill(page, {part: "\n".join([where, "", *(markdown_table(*it) for it in chosen)]) if where else chosen})
+    return tables
 
 
 def named(names: str) -> dict[str, Pipeline]:
@@ -137,6 +200,13 @@ def named(names: str) -> dict[str, Pipeline]:
         return {name: named_pipeline(name) for name in names.split(",")}
     except InvalidParameterError as error:
         raise typer.BadParameter(str(error)) from None
+
+
+def numbers(text: str) -> list[int]:
+    """Numbers with commas."""
+    if not all(word.isdecimal() for word in text.split(",")):
+        raise typer.BadParameter(f"{text}: give numbers with commas, such as 1024,4096")
+    return [int(word) for word in text.split(",")]
 
 
 def with_solves(pipeline: Pipeline, n: int) -> Pipeline:

@@ -1,29 +1,25 @@
-"""The contraction against the baseline (figures 4 to 6 of Wen et al. 2024), and clouds as scanners give them."""
+"""The contraction against the baseline: figures 4 to 6 of Wen et al. 2024, and the whole pipelines."""
 
 from __future__ import annotations
 
-import json
-import os
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from statistics import median
-from unittest.mock import patch
 
 import numpy as np
 import typer
-from _clouds import Case, cases, folder_or
-from _runs import named, run, with_solves
-from _stages import growth, told
-from _stopwatch import STAGES, in_turns, yardstick
-from _tables import Table, Tables, good, keep, look, number, pick, sheet, short
 
-from glsk_o3d import Contractor, Pipeline, read_cloud
+from glsk_o3d import Contractor, Pipeline
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.data.report import REFUSED
-from glsk_o3d.interop.clouds import cloud_points
 from glsk_o3d.pipelines import default, wen2024
+
+from .clouds import Case, cases
+from .runs import named, run, with_solves
+from .scans import Scan, scanned
+from .stopwatch import in_turns, yardstick
+from .tables import Table, Tables, good, keep, look, pick, sheet
 
 BASES: dict[str, Callable[[], Pipeline]] = {"wen2024": wen2024, "default": default}
 WHOLE = ("cao2010", "wen2024", "default")
@@ -35,24 +31,6 @@ RULES: dict[str, list[str]] = {
 """Stop rules by the settings that give them, besides a fixed number of solves: the pipeline's own, that of cao2010."""
 CLAIMS = {1024: "about 1", 4096: "about 0.5", 16384: "less still"}
 """What Wen et al. 2024 find for the cost of their contraction over that of the baseline, figures 4 to 6."""
-NOISE = ("noise0.1", "noise0.3", "noise1")  # of the bodies, in percent of the diagonal
-VIEWS = ("clean", "depth2", "misreg", "lidar")  # of the shapes of folders
-OBJECTS = "scanned objects"
-TWO = {"OMP_NUM_THREADS": "2"}  # the package asks at every call
-
-
-@dataclass(frozen=True)
-class Scan:
-    """A cloud in a file, or so many of its points drawn at random."""
-
-    shape: str
-    path: Path
-    n: int
-
-    def load(self) -> tuple[np.ndarray, None]:
-        """The points, and no axis."""
-        points = cloud_points(read_cloud(self.path))
-        return np.random.default_rng(1).choice(points, self.n, replace=False), None
 
 
 def objects(folder: Path | None, own: bool, shapes: str, sizes: list[int]) -> list[tuple[int, Case | Scan]]:
@@ -67,23 +45,6 @@ def objects(folder: Path | None, own: bool, shapes: str, sizes: list[int]) -> li
         typer.echo(f"the built-in shapes instead for {', '.join(map(str, missing))} points", err=True)
         found += objects(None, True, "", missing)
     return found + [(scan.n, scan) for scan in scanned(sizes)]
-
-
-def scanned(sizes: Sequence[int]) -> list[Scan]:
-    """The scans of $GLSK_DATA, or of the folder shared/data beside the repository, that are large enough."""
-    try:
-        folder = folder_or(None, "GLSK_DATA", "shared/data")
-    except typer.BadParameter as problem:
-        typer.echo(f"left out: scans, {problem}", err=True)
-        return []
-    found: list[Scan] = []
-    listed = json.loads((folder / "manifest.json").read_text())
-    for n in sizes:
-        large = [it for it in listed if it["n_points"] >= n]
-        if len(large) < len(listed):
-            typer.echo(f"left out: {len(listed) - len(large)} clouds of less than {n} points", err=True)
-        found += [Scan(it["name"], folder / it["path"], n) for it in large]
-    return found
 
 
 def contractors(solves: int) -> dict[tuple[str, bool, str], tuple[Pipeline, Contractor]]:
@@ -224,67 +185,3 @@ def draw_figures(rows: list[dict], folder: Path) -> None:
         below.set_xticks(range(len(here)), [row["shape"] for row in here], rotation=90, fontsize=7)
         above.legend(frameon=False, ncols=3, fontsize=8)
         keep(figure, folder, f"contraction_{n}")
-
-
-# ---------------------------------------------------------------------------------------------------------------------
-
-
-def clouds(folders: Sequence[Path], sizes: Sequence[int]) -> list[tuple[str, int, Case | Scan]]:
-    """Kind, size and cloud: the package's own bodies with noise, the scans in folders, and scanned objects."""
-    found: list[tuple[str, int, Case | Scan]] = []
-    for kind in (*NOISE, *(VIEWS if folders else ())):
-        own = kind in NOISE
-        variants = ",".join(f"{kind}_{n}" for n in sizes)
-        found += [(kind, case.size, case) for case in cases(None if own else folders, own, variants)]
-    return found + [(OBJECTS, scan.n, scan) for scan in scanned(sizes)]
-
-
-def scan_costs(cloud: Case | Scan, pipeline: str, repeat: int) -> dict:
-    """The yardstick and the pipeline in turns, in one thread and in two."""
-    points = cloud.load()[0]
-
-    def skeleton() -> dict:
-        return told(named(pipeline)[pipeline](points))
-
-    tasks = {"1 kNN": partial(yardstick, points), "one": skeleton, "two": patch.dict(os.environ, TWO)(skeleton)}
-    found = in_turns(tasks, repeat, STAGES)
-    facts, costs = found["one"]
-    knn, wall = found["1 kNN"][1], found["two"][1]["wall"]
-    return facts | costs | dict(knn_cpu=knn["cpu"], knn_wall=knn["wall"], wall_of_two=wall)
-
-
-def measure_scans(folders: Sequence[Path], sizes: list[int], pipeline: str, repeat: int, jobs: int) -> list[dict]:
-    """A row for each cloud."""
-    named(pipeline)
-    work = [
-        (dict(measure="scans", kind=kind, n=n, shape=cloud.shape), (cloud, pipeline, repeat))
-        for kind, n, cloud in clouds(folders, sizes)
-    ]
-    return run(scan_costs, work, min(jobs, 1))
-
-
-def scan_tables(rows: list[dict]) -> Tables:
-    """What each kind costs, and how that grows; and what the stages have of it."""
-    header = ["", "points", "clouds", "1 kNN ms", "in kNN, median (quartiles)", "contracted", "wall ms, one thread"]
-    header += ["two threads", "growth", "note"]
-    lines, shares = [], []
-    for kind in dict.fromkeys(row["kind"] for row in rows):
-        mine = good(pick(rows, kind=kind))
-        sizes = sorted({row["n"] for row in mine})
-        at = {n: pick(mine, n=n) for n in sizes}
-        slope = growth(sizes, [_median(at[n], "cpu") for n in sizes])
-        failed = pick(rows, kind=kind)
-        note = "; ".join(f"{row['shape']}: {row['failure']}" for row in failed if "failure" in row)
-        for n in sizes:
-            low, middle, high = np.quantile([row["cpu"] / row["knn_cpu"] for row in at[n]], [0.25, 0.5, 0.75])
-            cells = [kind, str(n), str(len(at[n])), short(1000 * _median(at[n], "knn_cpu"))]
-            cells += [f"{middle:.1f} ({low:.1f} to {high:.1f})", f"{_median(at[n], 'contracted'):.0f}"]
-            cells += [short(1000 * _median(at[n], key)) for key in ("wall", "wall_of_two")]
-            lines.append([*cells, number(slope, 2), note])
-            of_stages = [np.median([row["stages"][stage]["cpu"] / row["knn_cpu"] for row in at[n]]) for stage in STAGES]
-            shares.append([kind, str(n), *(number(float(share), 2) for share in of_stages)])
-    return [("scans, CPU", header, lines), ("of it the stages, in kNN", ["", "points", *STAGES], shares)]
-
-
-def _median(rows: list[dict], key: str) -> float:
-    return float(np.median([row[key] for row in rows]))

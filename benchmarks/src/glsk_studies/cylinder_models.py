@@ -19,29 +19,13 @@ TEXT_COLUMNS = ("radius", "length", "start.x", "start.y", "start.z", "axis.x", "
 TEXT_COLUMNS += ("parent", "extension", "branch", "BranchOrder", "PositionInBranch")
 
 
-@dataclass(frozen=True)
-class Names:
-    """What the columns of a program are called, and which order its stem has."""
-
-    start: tuple[str, str, str]
-    radius: str
-    order: str
-    stem: int = 0
-    end: tuple[str, str, str] = ()  # type: ignore[assignment]
-    axis: tuple[str, str, str] = ()  # type: ignore[assignment]
-
-    @property
-    def needed(self) -> set[str]:
-        """All that a table must have."""
-        return {*self.start, *self.end, *self.axis, self.radius, self.order, "length"}
-
-
 STARTS, ENDS = ("startX", "startY", "startZ"), ("endX", "endY", "endZ")
 PROGRAMS = {
-    "TreeQSM": Names(("start.x", "start.y", "start.z"), "radius", "BranchOrder", axis=("axis.x", "axis.y", "axis.z")),
-    "SimpleForest": Names(STARTS, "radius", "branchOrder", end=ENDS),
-    "aRchi": Names(STARTS, "radius_cyl", "branching_order", stem=1, end=ENDS),
+    "TreeQSM": (("start.x", "start.y", "start.z"), ("axis.x", "axis.y", "axis.z"), "radius", "BranchOrder", 0),
+    "SimpleForest": (STARTS, ENDS, "radius", "branchOrder", 0),
+    "aRchi": (STARTS, ENDS, "radius_cyl", "branching_order", 1),
 }
+"""What the columns of a program are called: starts, ends or directions, radii, orders; and which order its stem has."""
 
 
 @dataclass(frozen=True)
@@ -83,15 +67,12 @@ def read_cylinder_model(path: Path) -> CylinderModel:
     A ``.mat`` has the struct ``cylinder``, by itself or in `MATRIX_STRUCTS`; of several models the first counts.
     """
     columns = _of_matrix(path) if path.suffix == ".mat" else _of_text(path)
-    names = next((each for each in PROGRAMS.values() if each.needed <= columns.keys()), None)
-    if names is None:
-        raise typer.BadParameter(f"{path}: no columns of {', '.join(PROGRAMS)}; there are {', '.join(columns)}")
-    start, end, axis = (
-        np.stack([columns[name] for name in triple], axis=1) if triple else None
-        for triple in (names.start, names.end, names.axis)
-    )
-    end = start + axis * columns["length"][:, None] if end is None else end
-    return CylinderModel(start, end, columns[names.radius], columns[names.order].astype(int) - names.stem)
+    for starts, ends, radius, order, stem in PROGRAMS.values():
+        if {*starts, *ends, radius, order, "length"} <= columns.keys():
+            start, end = (np.stack([columns[name] for name in names], axis=1) for names in (starts, ends))
+            end = end if ends == ENDS else start + end * columns["length"][:, None]
+            return CylinderModel(start, end, columns[radius], columns[order].astype(int) - stem)
+    raise typer.BadParameter(f"{path}: no columns of {', '.join(PROGRAMS)}; there are {', '.join(columns)}")
 
 
 def _of_text(path: Path) -> Mapping[str, np.ndarray]:

@@ -9,7 +9,6 @@ from collections.abc import Callable
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -36,35 +35,33 @@ EXTREMES = (-1, 0, 1, 2**31 - 1, 2**31, 2**32, 2**63, 10**18, 10**400, "1e308", 
 ENDINGS = (".ply", ".pcd", ".xyz", ".obj", ".stl", ".las", ".laz", ".e57", ".json", ".npz", ".swc")
 
 
-def file_case(rng: np.random.Generator, folder: Path) -> tuple[str, str, list[str], int]:
-    """Read one damaged file, written into a folder: its kind, whether it was ``"read"`` or ``"refused"``, findings,
-    and its size.
-    """
+def file_case(rng: np.random.Generator, folder: Path) -> tuple[str, str, list[str]]:
+    """Read one damaged file, written into a folder: its kind, whether it was ``"read"`` or ``"refused"``, findings."""
     names = [*seeds()]
     name = names[rng.integers(len(names))]
     kind, ending = name.split()[:2]
     data = damaged(seeds()[name], rng)
     if kind in ("cloud", "skeleton") and rng.random() < 0.05:
         ending = str(rng.choice(ENDINGS))
-    told, findings, _ = read(kind, ending, data, folder)
-    return f"{kind} {name.split()[1]}", told, findings, len(data)
+    return f"{kind} {name.split()[1]}", *read(kind, ending, data, folder)
 
 
-def read(kind: str, ending: str, data: bytes, folder: Path) -> tuple[str, list[str], Any]:
-    """Read a file, written into a folder: whether it was ``"read"`` or ``"refused"``, findings, and what it holds."""
+def read(kind: str, ending: str, data: bytes, folder: Path) -> tuple[str, list[str]]:
+    """Read a file, written into a folder: whether it was ``"read"`` or ``"refused"``, and findings."""
     path = folder / ("ledger.jsonl" if kind == "ledger" else f"f{ending}")
     path.write_bytes(data)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            return "read", [], READERS[kind](path)
+            READERS[kind](path)
+            return "read", []
         except (GlskError, OSError) as error:
-            said, wrong = str(error), []
-            if len(said) > 2000 or "\n" in said:
-                wrong.append(f"an error of {len(said)} characters and {said.count(chr(10)) + 1} lines")
-            if isinstance(error.__cause__, MemoryError) or "bad_alloc" in said or "Unable to allocate" in said:
-                wrong.append("it asked for more memory than there is")
-            return "refused", wrong, None
+            message, findings = str(error), []
+            if len(message) > 2000 or "\n" in message:
+                findings.append(f"an error of {len(message)} characters and {message.count(chr(10)) + 1} lines")
+            if isinstance(error.__cause__, MemoryError) or "bad_alloc" in message or "Unable to allocate" in message:
+                findings.append("it asked for more memory than there is")
+            return "refused", findings
         finally:
             path.unlink()
 
@@ -89,22 +86,13 @@ def _fill(data: bytearray, at: int, rng: np.random.Generator) -> None:
     data[at : at + int(rng.integers(1, 9))] = bytes(rng.choice([b"\xff", b"9", b"-", b" ", b"\n", b"nan", b"\x1b[31m"]))
 
 
-def _zero(data: bytearray, at: int, rng: np.random.Generator) -> None:
-    n = min(int(rng.integers(1, 9)), len(data) - at)
-    data[at : at + n] = bytes(n)
-
-
 def _repeat(data: bytearray, at: int, rng: np.random.Generator) -> None:
     start = int(rng.integers(len(data)))
     data[at:at] = data[start : start + int(rng.integers(1, 60))] * int(rng.choice([1, 1, 1, 200]))
 
 
 def _remove(data: bytearray, at: int, rng: np.random.Generator) -> None:
-    del data[at : at + int(rng.integers(1, 60))]
-
-
-def _truncate(data: bytearray, at: int, rng: np.random.Generator) -> None:
-    del data[at:]
+    del data[at : at + int(rng.integers(1, 60)) if rng.random() < 0.5 else None]
 
 
 def _number(data: bytearray, at: int, rng: np.random.Generator) -> None:
@@ -121,21 +109,19 @@ def _number(data: bytearray, at: int, rng: np.random.Generator) -> None:
         data[at : at + 4] = (int(rng.choice([0, 1, 2**31 - 1, 2**32 - 1, 2**16]))).to_bytes(4, "little")
 
 
-DAMAGES = (_flip, _flip, _fill, _zero, _repeat, _remove, _truncate, _number, _number)
+DAMAGES = (_flip, _flip, _fill, _repeat, _remove, _remove, _number, _number)
 
 
 @cache
 def seeds() -> dict[str, bytes]:
     """Sound files, by kind, ending and what else tells them apart; those of packages that are missing are left out."""
     with tempfile.TemporaryDirectory() as folder:
-        found = {**clouds(Path(folder)), **_skeletons(Path(folder)), **_others(Path(folder))}
-    return found
+        return {**_clouds(Path(folder)), **_skeletons(Path(folder)), **_others(Path(folder))}
 
 
-def clouds(folder: Path, n: int = 60) -> dict[str, bytes]:
-    """Sound files of so many points, or of a mesh."""
+def _clouds(folder: Path) -> dict[str, bytes]:
     o3d = import_open3d()
-    points = samples.torus(max(n, 60)).points[:n]
+    points = samples.torus(60).points
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
     cloud.colors = cloud.normals = cloud.points
     mesh = o3d.geometry.TriangleMesh.create_torus(1, 0.3, 6, 5)
@@ -159,7 +145,7 @@ def clouds(folder: Path, n: int = 60) -> dict[str, bytes]:
     rows = "\n".join(",".join(f"{value:.3f}" for value in row) + ",1" for row in points)
     found["cloud .csv"] = f"x,y,z,label\n{rows}\n".encode()
     found["cloud .txt"] = rows.replace(",", " ").encode()
-    head = f"ply\nformat ascii 1.0\nelement extra 2\nproperty list uchar int of\nelement vertex {n}\n"
+    head = "ply\nformat ascii 1.0\nelement extra 2\nproperty list uchar int of\nelement vertex 60\n"
     head += "".join(f"property double {axis}\n" for axis in "xyz") + "property float label\nend_header\n2 0 1\n1 5\n"
     found["cloud .ply list"] = (head + found["cloud .txt"].decode() + "\n").encode()
     if find_spec("laspy") and find_spec("lazrs"):

@@ -1,15 +1,19 @@
-"""Probabilities of the refiner's decisions: fitted to answered questions, and whether what is said is so as often."""
+"""Probabilities of the refiner's decisions: their weights fitted, and whether what they predict holds as often.
+
+python benchmarks/calibrate.py check --builtin --variant clean_1024,noise2_1024
+
+The README of the benchmarks says what each command shows.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
-from _clouds import Case
-from _tables import BLUE, GREY, Table, Tables, keep, number, pick, sheet
+import typer
 from glsk_bench.table import mean_with_interval, told
 from scipy.optimize import minimize
 from scipy.special import expit
@@ -18,6 +22,11 @@ from scipy.stats import rankdata
 from glsk_o3d.analysis import compare
 from glsk_o3d.data.decisions import QUESTIONS as ASKED
 from glsk_o3d.pipelines import default
+
+from .clouds import Case, cases
+from .questions import questions
+from .runs import Jobs, Markdown, Output, Own, Saved, Shapes, Variants, application, run, study
+from .tables import BLUE, GREY, Table, Tables, fill, keep, number, page_with, pick, present, read, save, sheet
 
 PENALTY = 1.0  # of half a weight's square, as if it were drawn from a normal distribution; the constant has none
 
@@ -32,6 +41,13 @@ QUESTIONS = {
 SEEN, UNSEEN = "all families", "the other families"  # to which weights are fitted
 MEASURES = ("topology", "perfect")
 Weights = dict[str, dict[str, float]]
+EVERY = "*_4096"
+Sources = Annotated[
+    list[Path] | None,
+    typer.Argument(metavar="DIR|JSON", exists=True, help="Folders of shapes, or questions that -o has written."),
+]
+
+app = application(__doc__)
 
 
 class Answered(NamedTuple):
@@ -44,7 +60,6 @@ class Answered(NamedTuple):
     families: np.ndarray
 
     def of(self, some: np.ndarray) -> Answered:
-        """Some of them."""
         return Answered(self.names, *(each[some] for each in self[1:]))
 
 
@@ -195,3 +210,91 @@ def table(rows: list[dict]) -> Table:
         lines.append([family, str(len(seen)), *cells])
     header = [f"{name}{word}" for name in MEASURES for word in (", all", ", others", ": change")]
     return "weights fitted to all families, and to the others", ["family", "clouds", *header], lines
+
+
+def rows_of(sources: list[Path] | None, own: bool, variant: str, shapes: str, jobs: int) -> list[dict]:
+    """The questions about every cloud, a row each; saved ones are not asked again."""
+    saved = [path for path in sources or () if path.is_file()]
+    rows = [row for path in saved for row in read(path)["rows"]]
+    if folders := [path for path in sources or () if path.is_dir()] or not saved:
+        found = cases(folders if sources else None, own, variant, shapes)
+        rows += run(questions, [(case.facts, (case, default())) for case in found], jobs)
+    for row in rows:
+        if "failure" in row:
+            typer.echo(f"{row['shape']} {row['variant']}: {row['failure']}", err=True)
+    return rows
+
+
+@app.command()
+def fit(
+    sources: Sources = None,
+    own: Own = False,
+    variant: Variants = EVERY,
+    shapes: Shapes = "",
+    jobs: Jobs = 2,
+    output: Output = None,
+) -> None:
+    """The weights with which the questions are answered best, as glsk_o3d/decisions.py has them."""
+    rows = rows_of(sources, own, variant, shapes, jobs)
+    save(output, rows)
+    for about, answered in by_question(rows).items():
+        lines = [f'    "{name}": {weight:.2f},' for name, weight in fitted(answered).items()]
+        typer.echo("\n".join([f"{about} = {{", *lines, "}"]))
+
+
+@app.command()
+def check(
+    sources: Sources = None,
+    own: Own = False,
+    variant: Variants = EVERY,
+    shapes: Shapes = "",
+    leave_family_out: Annotated[
+        bool,
+        typer.Option(
+            "--leave-family-out", help="Not the package's weights, but for each family those fitted to the others."
+        ),
+    ] = False,
+    learnt: Annotated[
+        Path | None,
+        typer.Option("--from", metavar="JSON", exists=True, dir_okay=False, help="Fitted to these, else to the same."),
+    ] = None,
+    page: Annotated[
+        Path | None,
+        typer.Option("--page", help="Put the tables into this page, a picture beside it.", callback=page_with("check")),
+    ] = None,
+    jobs: Jobs = 2,
+    output: Output = None,
+    markdown: Markdown = False,
+) -> None:
+    """Whether what has some probability is so as often."""
+    rows = rows_of(sources, own, variant, shapes, jobs)
+    save(output, rows)
+    found = by_question(rows)
+    if leave_family_out:
+        others = by_question(read(learnt)["rows"]) if learnt else found
+        told = {about: (without_family(it, others[about]), it) for about, it in found.items()}
+    else:
+        told = {about: (said(ASKED[about].weights, it), it) for about, it in found.items()}
+    shown = tables(told)
+    present(shown, markdown)
+    if page is not None:
+        fill(page, {"check": shown})
+        draw_reliability(told, page.parent / "images")
+
+
+@study(app, lambda rows: [table(rows)], "transfer")
+def transfer(
+    learnt: Saved,
+    folder: Annotated[Path, typer.Argument(metavar="DIR", exists=True, file_okay=False, help="Other shapes.")],
+    variant: Variants = "*",
+    shapes: Shapes = "",
+    jobs: Jobs = 2,
+) -> list[dict]:
+    """Right topologies with weights fitted to all families, and for each family with those fitted to the others."""
+    answered = by_question(read(learnt)["rows"])
+    found = cases(folder, False, variant, shapes)
+    seen = weights_of(answered)
+    unseen = {family: weights_of(answered, family) for family in {case.facts["family"] for case in found}}
+    work = [(dict(weights=SEEN, **case.facts), (case, seen)) for case in found]
+    work += [(dict(weights=UNSEEN, **case.facts), (case, unseen[case.facts["family"]])) for case in found]
+    return run(measure, work, jobs)
