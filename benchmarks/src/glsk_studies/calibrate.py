@@ -20,7 +20,8 @@ from scipy.special import expit
 from scipy.stats import rankdata
 
 from glsk_o3d.analysis import compare
-from glsk_o3d.data.decisions import QUESTIONS as ASKED
+from glsk_o3d.data.decisions import logistic
+from glsk_o3d.filters.refiner import QUESTIONS as ORDER
 from glsk_o3d.pipelines import default
 
 from .clouds import Case, cases
@@ -32,6 +33,7 @@ PENALTY = 1.0  # of half a weight's square, as if it were drawn from a normal di
 
 PARTS = 5  # of the range of probabilities, of the same width
 SURE = 1e-9  # a probability is taken to be as far from 0 and 1, or one mistake would make the loss infinite
+ASKED = {question.about: question for question in ORDER}
 QUESTIONS = {
     "loop": "a loop is a handle",
     "air": "a branch crosses air",
@@ -95,8 +97,7 @@ def fitted(answered: Answered) -> dict[str, float]:
 
 def said(weights: Mapping[str, float], answered: Answered) -> np.ndarray:
     """Probabilities, (n,) float array."""
-    question = ASKED["loop"]._replace(weights=weights)
-    return np.array([question.probability(dict(zip(answered.names, it, strict=True))) for it in answered.facts])
+    return np.array([logistic(weights, dict(zip(answered.names, it, strict=True))) for it in answered.facts])
 
 
 def log_loss(chance: np.ndarray, is_so: np.ndarray) -> float:
@@ -187,12 +188,14 @@ def weights_of(answered: Mapping[str, Answered], without: str | None = None) -> 
 def measure(case: Case, weights: Weights) -> dict[str, float]:
     """A skeleton of `default` with these weights, against its axis."""
     points, truth = case.load()
-    kept = {about: ASKED[about] for about in weights}
+    kept = {about: ASKED[about].weights for about in weights}
     try:
-        ASKED.update({about: ASKED[about]._replace(weights=them) for about, them in weights.items()})
+        for about, others in weights.items():
+            ASKED[about].weights = others
         return asdict(compare(default()(points), truth))
     finally:
-        ASKED.update(kept)
+        for about, own in kept.items():
+            ASKED[about].weights = own
 
 
 def table(rows: list[dict]) -> Table:

@@ -8,8 +8,6 @@ from itertools import pairwise
 
 import numpy as np
 from glsk_bench.shapes.axis import subdivided
-from glsk_o3d.curve.topology.air import branch_facts
-from glsk_o3d.curve.topology.evidence import Evidence, in_order
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import dijkstra, maximum_bipartite_matching
 from scipy.spatial import cKDTree
@@ -18,10 +16,13 @@ from scipy.spatial.distance import cdist
 from glsk_o3d import Pipeline, Refiner
 from glsk_o3d.analysis import Truth
 from glsk_o3d.analysis.comparison import TIP_REACH
+from glsk_o3d.curve.curve import Curve
+from glsk_o3d.curve.sampling import along_a_morton_curve, on_points
+from glsk_o3d.curve.surface import Evidence, Surface
+from glsk_o3d.curve.topology.false_branches import FalseBranches, branch_facts
 from glsk_o3d.curve.topology.gaps import gap_facts
-from glsk_o3d.curve.topology.loops import loop_facts
-from glsk_o3d.curve.topology.spurs import limb_facts
-from glsk_o3d.data.skeleton import Skeleton
+from glsk_o3d.curve.topology.loops import Loops, loop_facts
+from glsk_o3d.curve.topology.spurs import Limbs
 from glsk_o3d.geometry.cycles import minimum_cycle_basis
 from glsk_o3d.geometry.vectors import norm
 
@@ -48,55 +49,57 @@ def questions(case: Case, pipeline: Pipeline) -> dict:
 
 
 def asked(points: np.ndarray, truth: Truth, pipeline: Pipeline) -> list[tuple[str, dict[str, float], bool]]:
-    """The questions in the order in which a pipeline's refiner asks them, each of the skeleton that it has then."""
+    """The questions in the order in which a pipeline's refiner asks them, each of the curve that it has then."""
     *stages, refiner, _ = pipeline.stages
-    found = []
+    answers = []
 
-    def ask(raw: Skeleton) -> Skeleton:
-        found.extend(_asked(refiner, raw, truth))
+    def ask_all(raw: Curve) -> Curve:
+        answers.extend(_asked(refiner, raw, truth))
         return raw
 
-    in_order(ask, Pipeline(*stages)(points))
-    return found
+    raw = Curve.of(Pipeline(*stages)(points))
+    on_points(ask_all, raw, along_a_morton_curve(raw))
+    return answers
 
 
-def _asked(refiner: Refiner, raw: Skeleton, truth: Truth) -> Iterator[tuple[str, dict[str, float], bool]]:
-    skeleton, surface = refiner._fit(raw)
-    if not len(skeleton.edges):
+def _asked(refiner: Refiner, raw: Curve, truth: Truth) -> Iterator[tuple[str, dict[str, float], bool]]:
+    curve, surface = refiner.fitted(raw)
+    if not len(curve.edges):
         return
-    evidence = Evidence.of(skeleton, surface)
-    cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
+    surface = surface.oriented(curve)
+    cycles = minimum_cycle_basis(len(curve.vertices), curve.edges, curve.edge_lengths)
     if cycles:
-        placed = Placed(truth, skeleton.vertices)
-        for cycle, loop in zip(cycles, loop_facts(skeleton, cycles, evidence), strict=True):
+        placed = Placed(truth, curve.vertices)
+        for cycle, loop in zip(cycles, loop_facts(cycles, Evidence(curve, surface)), strict=True):
             yield "loop", loop.facts, placed.is_handle(cycle)  # also without an inside: of false ones there are few
-    skeleton, _ = refiner._asked("loop", skeleton, evidence)
-    yield from _limbs(skeleton, evidence, truth)
-    skeleton, _ = refiner._asked("limb", skeleton, evidence)
-    placed = Placed(truth, skeleton.vertices)
-    for branch, k, facts in branch_facts(skeleton, evidence):
+    curve = refiner.after(Loops(), curve, surface)[0]
+    yield from _limbs(curve, surface, truth)
+    curve = refiner.after(Limbs(), curve, surface)[0]
+    placed = Placed(truth, curve.vertices)
+    for branch, k, facts in branch_facts(Evidence(curve, surface)):
         yield "air", facts, placed.crosses_air(branch, k)
-    skeleton, _ = refiner._asked("air", skeleton, evidence)
-    placed = Placed(truth, skeleton.vertices)
-    for (leaf, other), facts in gap_facts(skeleton, evidence):
+    curve = refiner.after(FalseBranches(), curve, surface)[0]
+    placed = Placed(truth, curve.vertices)
+    for (leaf, other), facts in gap_facts(Evidence(curve, surface)):
         yield "gap", facts, bool(placed.joined(leaf, other))
 
 
-def _limbs(skeleton: Skeleton, evidence: Evidence, truth: Truth) -> Iterator[tuple[str, dict[str, float], bool]]:
+def _limbs(curve: Curve, surface: Surface, truth: Truth) -> Iterator[tuple[str, dict[str, float], bool]]:
     """A branch is a limb if a true tip is lost without it.
 
     Of two prongs in one end either may go. That which stands out more is not asked about: once the other is pruned, it
     is how the limb goes on.
     """
-    leaves = np.flatnonzero(skeleton.degree == 1)
+    leaves = np.flatnonzero(curve.degree == 1)
     tips = np.flatnonzero(np.bincount(truth.edges.ravel(), minlength=len(truth.nodes)) == 1)
-    near = cdist(skeleton.vertices[leaves], truth.nodes[tips]) <= TIP_REACH * truth.radii[tips]
+    near = cdist(curve.vertices[leaves], truth.nodes[tips]) <= TIP_REACH * truth.radii[tips]
     served = _served(near)
-    asked = {leaf: (facts, _served(near[leaves != leaf]) < served) for leaf, facts in limb_facts(skeleton, evidence)}
+    facts_of = {int(limb.part[-1]): limb.facts for limb in Limbs().candidates(Evidence(curve, surface), 0)}
+    asked = {leaf: (facts, _served(near[leaves != leaf]) < served) for leaf, facts in facts_of.items()}
     at = defaultdict[int, list[int]](list)
-    for branch in skeleton.branches:
+    for branch in curve.branches:
         for junction, leaf in (branch[[0, -1]], branch[[-1, 0]]):
-            if leaf in asked and skeleton.degree[junction] == 3:
+            if leaf in asked and curve.degree[junction] == 3:
                 at[junction].append(leaf)
     for prongs in at.values():
         if len(prongs) == 2 and not any(asked[leaf][1] for leaf in prongs):
