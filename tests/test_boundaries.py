@@ -69,7 +69,7 @@ def test_a_raw_graph_keeps_in_a_file_who_represents_whom(tmp_path):
     raw = pipelines.rings().with_options(size=5000, thin_to=2500)(CLOUDS["sampled"])
     for stage in pipelines.default().stages[5:7]:
         raw = stage(raw)
-    known = raw.map.row_of_point
+    known = raw.representative_of_point
     assert 0 < (known == np.arange(12000)).sum() < (known >= 0).sum() < 12000
     others = known[(known >= 0) & (known != np.arange(12000))]
     assert np.isin(others, raw.supporting_points).all()

@@ -101,7 +101,7 @@ def test_points_without_a_vertex_or_a_normal_keep_none_and_the_others_have_one(r
     """Also where nobody says which points show the surface."""
     owner, normals = raw.vertex_of_point.copy(), raw.normals.copy()
     owner[::50], normals[1::50] = -1, np.nan
-    for representative in (raw.map.row_of_point, None):
+    for representative in (raw.representative_of_point, None):
         given = replace(raw, vertex_of_point=owner, normals=normals, representative_of_point=representative)
         found = Refiner(**options)(given)
         np.testing.assert_array_equal(found.vertex_of_point < 0, owner < 0)

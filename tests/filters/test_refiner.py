@@ -168,7 +168,7 @@ def test_points_that_do_not_show_the_surface_have_no_say_and_belong_to_the_neare
 def test_points_outside_a_sample_have_the_vertex_of_their_representative():
     raw = (pipelines.rings() | Contractor() | Connector())(samples.y_junction(n=120_000).points)
     outside = np.setdiff1d(np.arange(120_000), raw.supporting_points)
-    representative = raw.map.row_of_point[outside]
+    representative = raw.representative_of_point[outside]
     assert len(outside) > 50_000
     assert np.isin(representative, raw.supporting_points).all()
     away = np.linalg.norm(raw.points[outside] - raw.points[representative], axis=1)

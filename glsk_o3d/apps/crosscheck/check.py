@@ -7,7 +7,6 @@ import numpy as np
 
 from ...analysis.agreement import OperatorAgreement, SkeletonAgreement, compare_skeletons
 from ...api import as_pipeline
-from ...curve.thin.detect import THIN
 from ...data.contraction import Contraction
 from ...data.points import Points
 from ...data.skeleton import Skeleton
@@ -28,6 +27,7 @@ from .solid import Solid, ball_pivoting, given, poisson
 
 MADE_BY = ("auto", "poisson", "ball_pivoting")
 COMPARISON_STEP = 0.002  # precision: of the diagonal: spacing of the places where skeletons are compared
+LEAST_SURFACE = 1e-9  # precision: of a surface in the working frame
 DOUBTFUL_ANGLE = 30.0  # measured: degrees by which the mean curvature vectors differ where points are doubtful
 
 
@@ -140,7 +140,7 @@ def cross_check(cloud: Any, *, pipeline: Pipeline[Any, Any] | str = "default", m
     skeleton: Skeleton = Pipeline(*pipeline.stages[rings + 1 :])(state)
 
     ours = ring_operator(state.positions, state.rings)
-    if not ours.area.sum() > THIN.least_surface:
+    if not ours.area.sum() > LEAST_SURFACE:
         raise InvalidCloudError("the points lie on a line: there is no surface to compare with")
     dense = state if points is every else builder(every)
     frame, body = state.frame, _body(cloud, mesh, dense, spacing(state.positions))
