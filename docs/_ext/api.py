@@ -1,8 +1,14 @@
-"""The pages of the API reference: one per task, one per public name: from the stubs, ``__all__`` and the modules."""
+"""The pages of the API reference, one per task and one per public name, and the links in docstrings.
+
+A Sphinx extension; the tests read its lists without Sphinx.
+"""
 
 import importlib
 import inspect
+import re
 from pathlib import Path
+
+GENERATED = Path(__file__).resolve().parents[1] / "generated"
 
 TASKS = {
     "skeletons": ("From a cloud to its skeleton", "glsk_o3d"),
@@ -214,3 +220,20 @@ def write(folder: Path) -> None:
         page = folder / f"{name}.rst"
         if not page.exists() or page.read_text() != text:  # what has not changed is not read again
             page.write_text(text)
+
+
+def stay_text(app, env, node, contnode):
+    """A parameter in single backticks has no page: it stays text."""
+    return contnode if node["reftype"] == "obj" and "." not in node["reftarget"] else None
+
+
+def link_pages(app, what, name, thing, options, lines):
+    """The path of a page in a docstring becomes a link."""
+    lines[:] = [re.sub(r"docs/((?:filters/)?\w+)\.md", r":doc:`/docs/\1`", line) for line in lines]
+
+
+def setup(app):
+    app.connect("config-inited", lambda app, config: write(GENERATED))
+    app.connect("autodoc-process-docstring", link_pages)
+    app.connect("missing-reference", stay_text)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

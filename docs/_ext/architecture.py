@@ -15,7 +15,8 @@ PACKAGE = Path(__file__).resolve().parents[2] / "glsk_o3d"
 ROWS = (
     {"command line": ("cli", "__main__")},
     {"applications": ("apps",)},
-    {"pictures and windows": ("viewing",), "files": ("io",)},
+    {"pictures and windows": ("viewing",)},
+    {"files": ("io",)},
     {"editing": ("editing",)},
     {"analysis": ("analysis",)},
     {"api": ("api",)},
@@ -31,7 +32,7 @@ ROWS = (
 """Boxes by row, users above the used, and the modules and packages in each."""
 
 ASIDE = {
-    **dict.fromkeys(("pictures and windows", "pipeline", "samples"), 3.0),
+    **dict.fromkeys(("pipeline", "samples"), 3.0),
     "other packages, and files": 2.4,
 }
 """Where in the drawing the boxes are that are not in its middle."""
