@@ -66,6 +66,7 @@ sphinx_gallery_conf = dict(
     show_signature=False,
     within_subsection_order="FileNameSortKey",
     thumbnail_size=(480, 360),
+    remove_config_comments=True,
     write_computation_times=False,
 )
 

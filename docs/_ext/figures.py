@@ -170,9 +170,8 @@ def contraction():
     points = animal()
     states = []
     (glsk.pipelines.rings() | glsk.Contractor())(points, on_state=states.append)
-    left = [len(points), *map(len, states)]
-    shown = range(len(left))
-    titles = [f"solve {t}: {left[t]} points" if t else f"the scan: {left[0]} points" for t in shown]
+    remaining = map(len, states)
+    titles = [f"the scan: {len(points)} points", *(f"solve {t}: {n} points" for t, n in enumerate(remaining, 1))]
     figure, axes = panels(titles, 0.8, columns=3)
     for each, places in zip(axes, [points, *(state.contracted for state in states)], strict=False):
         dots(each, places, INK, 1.5)
@@ -290,9 +289,9 @@ def limits():
         skeleton = skeletonised(points)
         dots(each, points, size=1.5 if len(points) > 500 else 6)
         graph(each, skeleton)
-        said = (skeleton.report.warnings or ("no warning",))[0].partition(":")[0]
+        warning = (skeleton.report.warnings or ("no warning",))[0].partition(":")[0]
         parts = f"components: {skeleton.n_components}, loops: {skeleton.n_loops}" if len(skeleton.edges) else "no edges"
-        each.set_title(f"{name}\n{said}; {parts}", fontsize=9, color=INK)
+        each.set_title(f"{name}\n{warning}; {parts}", fontsize=9, color=INK)
     return figure
 
 
@@ -316,9 +315,9 @@ def things():
             edges = view(thing.nodes)[:, :2][thing.edges[thing.judged]]
             each.add_collection(LineCollection(edges, colors=BLUE, linewidths=3.2, alpha=0.6, capstyle="round"))
             graph(each, skeleton)
-            found = score(thing, skeleton.vertices, skeleton.edges)
+            scores = score(thing, skeleton.vertices, skeleton.edges)
             each.set_title(
-                f"{name}: error {found.error:.2f}, {'right' if found.perfect else 'wrong'}", fontsize=9, color=INK
+                f"{name}: error {scores.error:.2f}, {'right' if scores.perfect else 'wrong'}", fontsize=9, color=INK
             )
     return figure
 

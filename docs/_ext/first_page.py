@@ -89,13 +89,13 @@ def showcase():
     total = sum(wide for _, wide, _, _ in objects) + 0.2 * len(objects)
     figure = Figure((total, height), facecolor="white")
     FigureCanvasAgg(figure)
-    left = 0.1
+    offset = 0.1
     for name, wide, points, angles in objects:
         skeleton = skeletonised(points)
-        axes = figure.add_axes([left / total, foot / height, wide / total, 1 - foot / height])
+        axes = figure.add_axes([offset / total, foot / height, wide / total, 1 - foot / height])
         portrait(axes, skeleton, points, np.array([wide, height - foot]), **angles)
-        figure.text((left + wide / 2) / total, 0.12 / height, name, ha="center", fontsize=12.5, color=INK)
-        left += wide + 0.2
+        figure.text((offset + wide / 2) / total, 0.12 / height, name, ha="center", fontsize=12.5, color=INK)
+        offset += wide + 0.2
     return figure
 
 

@@ -24,8 +24,8 @@ BLOCKS = (
 )
 
 
-def drawn(formula, display):
-    """A formula whose primes stand beside their letters: fonts have them raised, and raised once more they vanish."""
+def mathml(formula, display):
+    """A formula with primes beside their letters, because fonts have raised primes and a raised one would vanish."""
     math = ElementTree.fromstring(convert(formula, display=display))
     for part in [*math.iter(f"{SPACE}msup"), *math.iter(f"{SPACE}msubsup")]:
         letter, *index, raised = part
@@ -40,7 +40,7 @@ def drawn(formula, display):
             part[:] = [row([letter, *primes]), *index, *([row(above)] if above else [])]
     for bar in math.iter(f"{SPACE}mo"):
         if bar.text in BARS:
-            bar.attrib.setdefault("stretchy", "false")  # \left and \right say that one is to stretch
+            bar.attrib.setdefault("stretchy", "false")  # \left and \right ask for one that stretches
     return ElementTree.tostring(math, encoding="unicode")
 
 
@@ -51,7 +51,7 @@ def row(parts):
 
 
 def inline(translator, node):
-    translator.body.append(drawn(node.astext(), "inline"))
+    translator.body.append(mathml(node.astext(), "inline"))
     raise SkipNode
 
 
@@ -60,7 +60,7 @@ def displayed(translator, node):
     tag = TAG.search(formula)
     number = f'<span class="number">({tag[1]})</span>' if tag else ""
     anchor = f' id="equation-{tag[1]}"' if tag else ""
-    shown = drawn(TAG.sub("", formula).strip(), "block")
+    shown = mathml(TAG.sub("", formula).strip(), "block")
     translator.body.append(f'<div class="equation"{anchor}>{shown}{number}</div>')
     raise SkipNode
 
