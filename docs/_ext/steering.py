@@ -103,15 +103,33 @@ def value_of(name, statement):
     return ast.unparse(statement.value)
 
 
+def all_fields():
+    """Every number of a step, a field of its dataclass, as a list of Number."""
+    numbers = []
+    for path in files():
+        text = path.read_text(encoding="utf-8")
+        place = path.relative_to(PACKAGE).with_suffix("").as_posix()
+        for owner in (node for node in ast.parse(text).body if isinstance(node, ast.ClassDef)):
+            for field in owner.body:
+                call = getattr(field, "value", None)
+                if isinstance(field, ast.AnnAssign) and getattr(getattr(call, "func", None), "id", None) in ORIGINS:
+                    value, what = call.args
+                    written = ast.get_source_segment(text, value)
+                    numbers.append(Number(place, field.target.id, written, call.func.id, what.value))
+    return numbers
+
+
 def weights():
     """The weights of the four questions."""
-    from glsk_o3d.data.decisions import QUESTIONS
+    from glsk_o3d.data.decisions import WORDS
+    from glsk_o3d.filters.refiner import QUESTIONS
 
     found = []
-    for about, question in QUESTIONS.items():
-        what = f"whether {question.asks.replace(' at ({})', '')}"
+    for question in dict.fromkeys(QUESTIONS):
+        place = question.__module__.removeprefix("glsk_o3d.").replace(".", "/")
+        what = f"whether {WORDS[question.about].asks.replace(' at ({})', '')}"
         for fact, weight in question.weights.items():
-            found.append(Number("decisions", f"{about}: {fact}", f"{weight:g}", "fitted", what))
+            found.append(Number(place, f"{question.about}: {fact}", f"{weight:g}", "fitted", what))
     return found
 
 
@@ -141,7 +159,7 @@ def defaults():
 
 def steering():
     """All numbers that steer, as a list of Number."""
-    return [number for number in [*defaults(), *weights(), *all_constants()] if number.steers]
+    return [number for number in [*defaults(), *weights(), *all_fields(), *all_constants()] if number.steers]
 
 
 if __name__ == "__main__":

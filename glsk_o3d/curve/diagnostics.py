@@ -6,7 +6,7 @@ import numpy as np
 
 from ..data.decisions import coordinates
 from ..geometry.groups import component_labels, group_median, group_sum
-from ..geometry.numbers import warning
+from ..geometry.numbers import precision, warning
 from ..geometry.vectors import dot, norm
 from .curve import Curve
 from .numbers import CURVE
@@ -19,6 +19,7 @@ class WarningNumbers:
     ball_spread: float = warning(
         0.5, "spread of normal lines around where they meet, over the radius: ball 0, torus .65, tube 1"
     )
+    regular: float = precision(1e-9, "weight of the first vertex, per point, where normals do not say where they meet")
     low_confidence: float = warning(0.1, "confidence below which a vertex is not to be trusted")
     low_share: float = warning(0.25, "share of the points around such vertices that is worth a warning")
 
@@ -72,7 +73,9 @@ def diagnose(curve: Curve) -> list[str]:
 
     points = cloud.points - curve.vertices[0]
     # of every normal line I - n n^T, which takes away what is along it
-    weight = (size[:, :, None] + 1e-9 * np.maximum(size, 1)[:, :, None]) * np.eye(3) - group_sum(along, component, n)
+    weight = (size[:, :, None] + WARN.regular * np.maximum(size, 1)[:, :, None]) * np.eye(3) - group_sum(
+        along, component, n
+    )
     height = dot(normals, points)[:, None]
     meet = np.linalg.solve(weight, group_sum(points - height * normals, component, n)[:, :, None])[:, :, 0]
     offset = points - meet[component]

@@ -13,12 +13,13 @@ from ..geometry.rings import star_rings
 from ..parameters import documented, parameter, resolve_length
 from ..pipeline import Filter, RunContext
 
+PUBLISHED_SHARE, PUBLISHED_RINGS = 0.012, (8, 30)  # published: neighbours over points, and their limits
 LEAST_RING = 3  # derived: neighbours that a radius leaves, at least
 
 
 def published_k(n: int) -> int:
     """Neighbours per point, itself included: 1.2 % of the cloud, between 8 and 30 (Cao et al. 2010)."""
-    return int(np.clip(np.floor(0.012 * n + 0.5), 8, 30))
+    return int(np.clip(np.floor(PUBLISHED_SHARE * n + 0.5), *PUBLISHED_RINGS))
 
 
 @documented

@@ -31,7 +31,7 @@ class ThinnerNumbers:
     wider_bias: float = measured(1.25, "bias of points around on tubes with 18 to 80 of them in noise")
 
 
-THINNER = ThinnerNumbers()
+THIN_OUT = ThinnerNumbers()
 
 
 @documented
@@ -113,7 +113,7 @@ def thin(points: np.ndarray, neighbours: np.ndarray, n: int) -> np.ndarray:
         nearest = np.argsort(((points[kept] - points[swallowed]) ** 2).sum(axis=1), kind="stable")[:too_many]
         return kept[nearest], swallowed[nearest]
 
-    representative = merge_pairs(points, neighbours, choose, least=max(n, THINNER.ask_again * len(points)))
+    representative = merge_pairs(points, neighbours, choose, least=max(n, THIN_OUT.ask_again * len(points)))
     remaining = representative == np.arange(len(points))
     rows = np.flatnonzero(remaining)
     if n < len(rows) < len(points):
@@ -133,7 +133,7 @@ def thin_nearer(points: np.ndarray, neighbours: np.ndarray, apart: np.ndarray) -
         kept, swallowed = pairs
         reach = np.minimum(apart[kept], apart[swallowed])
         nearer = norm(points.take(kept, axis=0) - points.take(swallowed, axis=0)) < reach
-        nearer &= np.count_nonzero(nearer) > THINNER.least_merged * len(points)
+        nearer &= np.count_nonzero(nearer) > THIN_OUT.least_merged * len(points)
         kept, swallowed = kept[nearer], swallowed[nearer]
         swap = mass[kept] < mass[swallowed]
         return np.where(swap, swallowed, kept), np.where(swap, kept, swallowed)
@@ -154,11 +154,11 @@ def spacing_enough(points: np.ndarray, neighbours: np.ndarray, spread: np.ndarra
     disc = np.sqrt(4 * np.pi * np.sqrt(spread[:, 1] * spread[:, 2])) / k
     spacing = np.maximum(disc, np.sqrt(12 * spread[:, 2] / k) / k)
     average = mean_over(neighbours)
-    bent = 1 / (np.maximum(points_around(points, average, spread), THINNER.least_around) * np.maximum(spacing, TINY))
-    for _ in range(THINNER.smoothing):
+    bent = 1 / (np.maximum(points_around(points, average, spread), THIN_OUT.least_around) * np.maximum(spacing, TINY))
+    for _ in range(THIN_OUT.smoothing):
         bent = average @ bent
     among = np.minimum(1 / (max(around, 1) * np.maximum(bent, TINY)), np.sqrt(spacing @ spacing / POINTS.enough))
-    return np.minimum(np.sqrt(THINNER.packed) * among, 2 * spacing)
+    return np.minimum(np.sqrt(THIN_OUT.packed) * among, 2 * spacing)
 
 
 def points_around(points: np.ndarray, average: csr_array, spread: np.ndarray) -> np.ndarray:
@@ -175,15 +175,15 @@ def points_around(points: np.ndarray, average: csr_array, spread: np.ndarray) ->
     but noise is seen.
     """
     k = average.nnz // len(points)
-    wider = principal_parts(wide_covariances(points, lambda values: average @ values, THINNER.wider_steps)[0])[0]
+    wider = principal_parts(wide_covariances(points, lambda values: average @ values, THIN_OUT.wider_steps)[0])[0]
     near = np.maximum(spread.T / k, TINY)
     sheet = np.clip(
-        wider[1] / (THINNER.sheet_from * np.maximum(wider[2], TINY)), 0, 1
+        wider[1] / (THIN_OUT.sheet_from * np.maximum(wider[2], TINY)), 0, 1
     )  # rounding leaves less than nothing
     bent = np.maximum(wider[0] - near[0], 0) / np.maximum((wider[2] / near[2]) ** 2 - 1, TINY)
     bent = sheet * bent + (1 - sheet) * np.maximum(wider[0], 0)
     with np.errstate(divide="ignore"):
-        return THINNER.wider_bias * np.sqrt(np.pi * k / 4 * near[2] / bent)
+        return THIN_OUT.wider_bias * np.sqrt(np.pi * k / 4 * near[2] / bent)
 
 
 def mean_over(neighbours: np.ndarray) -> csr_array:

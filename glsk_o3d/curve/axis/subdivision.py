@@ -7,6 +7,7 @@ from ...geometry.vectors import TINY, dot, norm
 from ..curve import Curve
 from ..numbers import CURVE
 
+EDGE_PIECES = 1000  # speed: of an edge, where parts have no thickness
 SUBDIVISION_CHUNK = 65536  # speed: points at a time: memory stays flat
 
 
@@ -17,7 +18,7 @@ def subdivide_edges(curve: Curve, spacing: float) -> Curve:
     """
     ends, m = curve.edges, len(curve.vertices)
     half = curve.sections.radius[ends].mean(axis=1)
-    length = np.maximum(spacing * half, np.maximum(1e-3 * curve.edge_lengths, TINY))
+    length = np.maximum(spacing * half, np.maximum(curve.edge_lengths / EDGE_PIECES, TINY))
     points = (curve.cloud.mass / np.maximum(curve.degree, 1))[ends].sum(axis=1)
     most = np.maximum(points / CURVE.half_support, 1)
     pieces = np.ceil(np.clip(curve.edge_lengths / length, 1, most)).astype(int)  # also edges of no length are one

@@ -25,6 +25,7 @@ class JunctionNumbers:
 
     line_noise: float = fitted(0.05, "radii that a line is off at its middle, on a straight limb")
     line_step: float = derived(0.1, "radii from one place on a limb to the next that is asked")
+    fade: float = derived(1.5, "lengths of its line, over the last of which a limb counts less and less")
     most_steps: int = derived(400, "places on a limb at most")
     least_steps: int = precision(8, "places on a limb at least")
     surface: float = fitted(12.0, "weight of the surface that fits a sphere, over that of a certain line")
@@ -216,7 +217,7 @@ def limb_line(
         clear[:half] = np.minimum.accumulate(clear[:half][::-1])[::-1]  # what left and came back had not left
     start = float((1 - clear[:half]).sum() * step)
     anchor = place_at(places, along, start)
-    weight = clear * np.clip(1.5 - np.cumsum(clear) * step / max(CURVE.line_length * radius, TINY), 0, 1)
+    weight = clear * np.clip(JUNCTION.fade - np.cumsum(clear) * step / max(CURVE.line_length * radius, TINY), 0, 1)
     total = weight.sum()
     if total * step <= 0:
         return Line(anchor, np.zeros(3), 0.0, 0.0, start, anchor[None], radius)

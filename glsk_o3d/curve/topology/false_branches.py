@@ -26,6 +26,7 @@ class FalseBranchNumbers:
 
     window: float = derived(1.0, "radii of a branch along which evidence is averaged; false edges have two or more")
     scatter: float = fitted(0.05, "least scatter of winding numbers along a curve, over their median")
+    deviation: float = derived(1.4826, "standard deviation of a normal distribution over its median absolute one")
     least_surface: float = fitted(0.05, "share of a tube's area below which the surface says no more")
     least_bonds: float = fitted(0.05, "share of a tube's points below which bonds say no more")
     least_length: float = fitted(0.1, "radii below which a length says no more")
@@ -83,7 +84,7 @@ def branch_facts(evidence: Evidence) -> Iterator[tuple[np.ndarray, int, dict[str
     vertices, edges, m = curve.vertices, curve.edges, len(curve.vertices)
     length = np.maximum(curve.edge_lengths, TINY)
     typical = quantile(winding)
-    scatter = 1.4826 * quantile(np.abs(winding - typical)) + FALSE_BRANCH.scatter * abs(typical)
+    scatter = FALSE_BRANCH.deviation * quantile(np.abs(winding - typical)) + FALSE_BRANCH.scatter * abs(typical)
     tubes = 2 * np.pi * np.maximum(curve.radii[edges].mean(axis=1), TINY) @ length
     area = evidence.area.sum()
     seen = max(area / max(tubes, area * TINY, TINY), TINY)  # a line has no tubes

@@ -31,7 +31,7 @@ class GapNumbers:
     least_cap: float = fitted(0.1, "flux below which the cap of an end says no more")
 
 
-GAP = GapNumbers()
+GAPS = GapNumbers()
 
 BRIDGE_SAMPLES = np.arange(1, 8)[:, None] / 8  # derived: places along a bridge, evenly
 
@@ -94,8 +94,8 @@ def gap_facts(evidence: Evidence) -> Iterator[tuple[tuple[int, int], dict[str, f
     winding = surface.winding(np.concatenate(samples)).reshape(len(bridges), -1).min(axis=1) / typical
     for (end, other), least in zip(bridges, winding, strict=True):
         facts = dict(
-            winding=float(np.clip(least, GAP.least_winding, GAP.most_winding)),
-            cap=float(np.log(_cap(end, surface) + GAP.least_cap)),
+            winding=float(np.clip(least, GAPS.least_winding, GAPS.most_winding)),
+            cap=float(np.log(_cap(end, surface) + GAPS.least_cap)),
         )
         yield (end.leaf, other), facts
 
@@ -107,11 +107,11 @@ def _aims(curve: Curve, end: _End, travelled: np.ndarray, leaves: list[int], alo
     cosine = across @ end.outward / away
     free = curve.degree == 1
     gap = away - np.where(free, 0, curve.radii)
-    aims = (gap < GAP.reach * end.radius) & (cosine > GAP.cosine) & (curve.degree > 0)
-    aims &= travelled > GAP.detour * away
+    aims = (gap < GAPS.reach * end.radius) & (cosine > GAPS.cosine) & (curve.degree > 0)
+    aims &= travelled > GAPS.detour * away
     cost = gap + away * (1 - cosine) / 2
     # what the way by an end leads to is behind it, and not asked for itself
-    behind = ((away[leaves][:, None] + along)[aims[leaves]] < GAP.detour * away).any(axis=0)
+    behind = ((away[leaves][:, None] + along)[aims[leaves]] < GAPS.detour * away).any(axis=0)
     for kind in (free, ~free & ~behind):
         rows = np.flatnonzero(aims & kind)
         if len(rows):

@@ -31,6 +31,7 @@ class LimbNumbers:
     long: float = derived(4.0, "half widths of a part that is twice as long as it is wide")
     slenderest: float = derived(0.2, "radius over that of the junction below which a branch is no more of a limb")
     stoutest: float = derived(2.0, "the same above which it is no less of one")
+    sure_sine: float = precision(1e-6, "sine of the angle between branch and width, below which the width is chance")
     directions: int = precision(16, "directions across a branch; eight are enough for flat parts")
 
 
@@ -171,7 +172,7 @@ def _beside(
     tangent = unit((places[:, 2:] - places[:, :-2]).reshape(-1, 3))
     second = cross(tangent, width[np.concatenate(near)])
     # the width of a vertex without points is any direction, also along the branch
-    second = unit(np.where(norm(second)[:, None] > 1e-6, second, plane_axes(tangent)[:, :, 0]))
+    second = unit(np.where(norm(second)[:, None] > LIMB.sure_sine, second, plane_axes(tangent)[:, :, 0]))
     turn = np.linspace(0, 2 * np.pi, LIMB.directions, endpoint=False)[:, None, None]
     across = np.cos(turn) * cross(second, tangent) + np.sin(turn) * second
     away = CURVE.beside * half[:, None, None] * across.reshape(LIMB.directions, len(paths), -1, 3)
