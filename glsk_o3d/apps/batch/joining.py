@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -17,7 +16,7 @@ from ...data.skeleton import Skeleton
 from ...geometry.groups import component_labels
 from ...geometry.paths import maximal_paths
 from ...geometry.vectors import dot, norm
-from .grid import CUT_REACH, Grid, Tile
+from .tiles import CUT_REACH, Grid, Tile
 
 SAMPLE_STEP = 0.25  # fitted: of the scale of a curve, between the places at which others are compared with it
 MOST_SAMPLES = 1000  # derived: places on an edge, where the part has no thickness: a thousandth of it is near enough
@@ -145,15 +144,12 @@ class Seams(NamedTuple):
         """What is to be beware of, in sentences."""
         messages = []
         if self.unmatched:
-            messages.append(
-                f"{self.unmatched} of {self.joined + self.unmatched} cuts at seams have nothing to meet on the other "
-                "side, and end there: give larger tiles, or more overlap"
-            )
+            cuts = f"{self.unmatched} of {self.joined + self.unmatched} cuts at seams have nothing to meet"
+            messages.append(f"{cuts} on the other side, and end there: give larger tiles, or more overlap")
         if self.thickest > grid.thickest:
-            messages.append(
-                f"at seams there are parts thicker than the overlap of {grid.overlap:g} allows, radius up to "
-                f"{self.thickest:.3g}: give {grid.overlap * self.thickest / grid.thickest:.3g} or more"
-            )
+            parts = f"at seams there are parts thicker than the overlap of {grid.overlap:g} allows"
+            enough = grid.overlap * self.thickest / grid.thickest
+            messages.append(f"{parts}, radius up to {self.thickest:.3g}: give {enough:.3g} or more")
         return messages
 
 
@@ -308,26 +304,17 @@ class _Joint:
 
 def _stubs(values: np.ndarray, edges: np.ndarray, ends: np.ndarray) -> tuple[list[int], np.ndarray]:
     """Vertices of short limbs that end in a cut: on the other side they fork elsewhere; and the other cut ends."""
-    gone: list[int] = []
-    left: list[int] = []
-    around = defaultdict[int, set[int]](set)
-    for a, b in edges.tolist():
-        around[a].add(b)
-        around[b].add(a)
-    for end in ends.tolist():
-        path, length, longest = [end], 0.0, LONGEST_STUB * values[end, 5]
-        onward = around[end]
-        while len(onward) == 1 and length <= longest:
-            (at,) = onward
-            length += float(norm(values[None, at, :3] - values[path[-1], :3])[0])
-            onward = around[at] - {path[-1]}
-            path.append(at)
-        if len(path) > 1 and len(onward) > 1 and length <= longest:
-            gone += path[:-1]
-            around[path[-1]] = onward
-        else:
-            left.append(end)
-    return gone, np.array(left, np.int64)
+    degree = np.bincount(edges.ravel(), minlength=len(values))
+    stubs, others = list[int](), set(ends.tolist())
+    for path, _ in maximal_paths(len(values), edges):
+        path = path if path[0] in others else path[::-1]
+        if path[0] in others and degree[path[-1]] > 2:
+            length = norm(np.diff(values[path, :3], axis=0)).sum()
+            if length <= LONGEST_STUB * values[path[0], 5]:
+                stubs += path[:-1]
+                others.remove(path[0])
+                degree[path[-1]] -= 1
+    return stubs, np.array(sorted(others), np.int64)
 
 
 def inside(values: np.ndarray, low: np.ndarray, high: np.ndarray, by: np.ndarray | float = 0.0) -> np.ndarray:

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from glsk_o3d import InvalidParameterError
-from glsk_o3d.apps.batch.grid import Grid, checked_sizes, tile_name, tile_of
+from glsk_o3d.apps.batch.tiles import Grid, checked_sizes, tile_name, tile_of
 
 
 @given(

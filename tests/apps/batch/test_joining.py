@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from glsk_o3d import Skeleton, samples, skeletonize
 from glsk_o3d.analysis.curves import along, pieces
-from glsk_o3d.apps.batch.grid import Grid
 from glsk_o3d.apps.batch.joining import Strands, join_tiles
+from glsk_o3d.apps.batch.tiles import Grid
 
 NONE = np.empty((0, 3))
 

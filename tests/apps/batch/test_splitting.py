@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from glsk_o3d import FileFormatError, InvalidCloudError
-from glsk_o3d.apps.batch import splitting
-from glsk_o3d.apps.batch.grid import tile_of
+from glsk_o3d.apps.batch import tiles as batch_tiles
 from glsk_o3d.apps.batch.ledger import file_hash
-from glsk_o3d.apps.batch.splitting import Cut, add_to_parts, divide, known_split
+from glsk_o3d.apps.batch.tiles import Cut, add_to_parts, divide, known_split, tile_of
 from glsk_o3d.io import streaming
 from glsk_o3d.io.scan import Scan
 from glsk_o3d.io.scans import read_blocks, read_scan
@@ -46,7 +45,7 @@ def passes(monkeypatch):
         count.append(path)
         return read_blocks(path, rows=70, **options)
 
-    for module in (splitting, streaming):
+    for module in (batch_tiles, streaming):
         monkeypatch.setattr(module, "read_blocks", read)
     return count
 
@@ -101,7 +100,7 @@ def test_what_breaks_off_or_cannot_be_read_leaves_nothing(scene, split, tmp_path
         yield next(read_blocks(path, rows=100))
         raise OSError("the disk is gone")
 
-    monkeypatch.setattr(splitting, "read_blocks", broken)
+    monkeypatch.setattr(batch_tiles, "read_blocks", broken)
     with pytest.raises(OSError, match="the disk is gone"):
         split(scene, **TILES)
     assert not (tmp_path / "parts").exists()
@@ -109,7 +108,7 @@ def test_what_breaks_off_or_cannot_be_read_leaves_nothing(scene, split, tmp_path
 
 def test_a_splitting_that_is_killed_is_begun_anew(scene, split, tmp_path):
     code = (
-        "import os, sys; from pathlib import Path; from glsk_o3d.apps.batch import splitting as s\n"
+        "import os, sys; from pathlib import Path; from glsk_o3d.apps.batch import tiles as s\n"
         "s.write_json = lambda path, data: os._exit(9)\n"
         "s.divide(Path(sys.argv[1]), Path(sys.argv[2]), s.Cut(2.0, 0.25), [])"
     )

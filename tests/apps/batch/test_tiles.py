@@ -156,7 +156,7 @@ def test_what_is_refused_leaves_no_folder_behind(scene, tmp_path, options, messa
 
 @pytest.mark.parametrize("there", ["scene.ply", "recipe.json"])
 def test_what_is_refused_has_read_no_scene_and_left_no_parts(batch, tmp_path, monkeypatch, there):
-    import glsk_o3d.apps.batch.splitting as module
+    import glsk_o3d.apps.batch.tiles as module
 
     monkeypatch.delattr(module, "read_blocks")
     (tmp_path / "out").mkdir()
