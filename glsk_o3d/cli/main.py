@@ -17,15 +17,12 @@ from .batch import batch
 from .console import echo, say
 from .crosscheck import crosscheck
 from .edit import convert, edit, rig
-from .evaluate import evaluate
 from .filters import filters
-from .grasps import grasps
-from .info import info
-from .measures import branches, tree
+from .info import info, view
+from .measures import branches, evaluate, grasps, tree
 from .reporting import FAILURE_CODE, as_command, reporting
 from .run import run
 from .skeletonize import demo, skeletonize
-from .view import view
 
 EPILOG = (
     "Exit codes: 0 all went well; 1 the input or the run failed; 2 the command line is wrong; 130 interrupted. "
