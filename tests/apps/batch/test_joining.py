@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glsk_o3d import Skeleton, samples, skeletonize
+from glsk_o3d import Skeleton, samples
 from glsk_o3d.analysis.curves import along, pieces
 from glsk_o3d.apps.batch.joining import Strands, join_tiles
 from glsk_o3d.apps.batch.tiles import Grid
@@ -106,16 +106,6 @@ def test_a_curve_without_errors_comes_out_as_it_was():
     np.testing.assert_allclose(sections.half_thickness, joined.radii)
     cut = joined.vertices[~np.isin(joined.vertices[:, 0], axis.vertices[:, 0])]
     assert sorted(cut[:, 0]) == pytest.approx([1.05, 2.05])  # a quarter of the overlap beyond the faces
-
-
-def test_ends_that_meet_become_their_mean():
-    grid = three_tiles()
-    found = seen(rod([0.1, 0, 0], [2.9, 0, 0]), grid)
-    found[1, 0, 0] = replace(found[1, 0, 0], vertices=found[1, 0, 0].vertices + [0, 0.02, 0])
-    joined, _ = join_tiles(found, grid)
-    (at,) = np.flatnonzero(np.abs(joined.vertices[:, 0] - 1.05) < 1e-9)
-    assert joined.vertices[at, 1] == pytest.approx(0.01)
-    assert structure(joined) == (1, 0, 2)
 
 
 @pytest.mark.parametrize("shift", [-0.05, 0.0, 1e-12, 0.02, 0.05, 0.075])
@@ -240,19 +230,3 @@ def test_vertices_without_edges_are_kept_once():
 
 
 # ---------------------------------------------------------------------------------------------- through the pipeline
-
-
-def tiled(sample, low, size, overlap):
-    points = sample.points
-    grid = Grid.over(np.asarray(low, float), points.max(axis=0), size, overlap)
-    return join_tiles({tile: skeletonize(points[rows]) for tile, rows in grid.parted(points)}, grid)
-
-
-def test_a_fork_exactly_on_a_seam():
-    sample = samples.y_junction(8000)
-    fork = sample.nodes[np.bincount(sample.edges.ravel()) == 3][0]
-    for axis in (0, 2):
-        low = fork - 1.2
-        low[axis] = fork[axis] - 0.6
-        joined, seams = tiled(sample, low, max(0.6, 1.2), 0.3)
-        assert (structure(joined), len(joined.junctions), seams.unmatched) == ((1, 0, 3), 1, 0)
