@@ -18,28 +18,18 @@ SPECIAL = {
 }
 INPUTS = """
     skeletonize {}.ply -o o.ply
-    skeletonize {}.xyz -o o.ply
-    skeletonize {}.pcd -o o.ply
     skeletonize {}.laz -o o.ply
-    skeletonize {}.e57 -o o.ply
     skeletonize {}.stl -o o.ply
     skeletonize s.xyz -o o.ply --pipeline {}.json
     batch s.xyz -o out --pipeline {}.json
     run {}.mlx s.xyz -o o.ply
-    run glskeleton {}.ply -o o.ply
     evaluate {}.json s.xyz
     evaluate y.ply {}.xyz
     evaluate y.ply s.xyz --truth {}.npz
-    crosscheck {}.ply
     branches {}.npz
-    tree {}.json
-    grasps {}.npz --opening 1
     grasps y.ply --opening 1 --cloud {}.ply
-    edit {}.ply -o o.ply
     convert {}.obj o.ply
     rig y.ply {}.ply -o o.glb
-    view {}.ply --preview o.png
-    info {}.ply
     info {}.vtp
 """
 
@@ -79,12 +69,10 @@ def test_as_an_input(invoke, y, tmp_path, words, kind):
     [
         "skeletonize s.xyz -o {}.ply",
         "skeletonize s.xyz --preview {}.png",
-        "skeletonize s.xyz --report {}.html",
         "skeletonize s.xyz --labelled {}.ply",
         "branches y.ply -o {}.csv",
         "convert y.ply {}.json",
         "rig y.ply -o {}.glb",
-        "view y.ply --report {}.html",
     ],
 )
 def test_as_an_output(refused, y, tmp_path, words, kind):
