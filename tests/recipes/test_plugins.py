@@ -1,7 +1,6 @@
 """Filters and pipelines of other distributions: found, merged, and left out where they are broken."""
 
 import os
-import shutil
 import subprocess
 import sys
 import warnings
@@ -28,7 +27,6 @@ from glsk_o3d.pipeline import Filter
 from glsk_o3d.pipelines import PIPELINES
 from glsk_o3d.recipes import from_recipe, to_recipe
 from glsk_o3d.recipes.catalogue import BUILTIN, catalogue, known_pipelines, named_pipeline
-from glsk_o3d.recipes.plugins import forget_plugins
 
 POINTS = samples.y_junction(n=800).points
 SCRIPT = """<!DOCTYPE FilterScript>
@@ -200,20 +198,6 @@ def test_names_that_are_taken(install, name, owner):
     install("zz-later", "1", code, f"[glsk_o3d.filters]\n{name} = zz_later:{name}\n")
     assert only_warning(catalogue).endswith(f" left out: the name is that of {owner}")
     assert catalogue()[name] is before
-
-
-def test_a_distribution_found_twice_is_one(example, tmp_path, monkeypatch):
-    shutil.copytree(example, tmp_path / "again")
-    monkeypatch.syspath_prepend(tmp_path / "again")
-    forget_plugins()
-    assert {"Voxel", "RadiusFloor", "SolveCount"} <= catalogue().keys()
-    assert "coarse" in known_pipelines()  # a second one would be a warning, which is an error here
-
-
-def test_a_plugin_that_asks_for_plugins(install):
-    code = "from glsk_o3d.recipes.catalogue import known_pipelines\ndef nested(): return known_pipelines()['default']()"
-    install("glsk-nested", "1", code, "[glsk_o3d.pipelines]\nnested = glsk_nested:nested\n")
-    assert named_pipeline("nested") == glsk.pipelines.default()
 
 
 def test_a_run_of_a_built_in_pipeline_looks_for_none(example, root):

@@ -1,7 +1,5 @@
 """Tiles partition space, and scenes are split into a file for each: nothing is lost, and read twice at most."""
 
-import subprocess
-import sys
 from dataclasses import asdict
 
 import numpy as np
@@ -137,18 +135,6 @@ def test_what_breaks_off_or_cannot_be_read_leaves_nothing(scene, split, tmp_path
     with pytest.raises(OSError, match="the disk is gone"):
         split(scene, **TILES)
     assert not (tmp_path / "parts").exists()
-
-
-def test_a_split_that_is_killed_is_begun_anew(scene, split, tmp_path):
-    code = (
-        "import os, sys; from pathlib import Path; from glsk_o3d.apps.batch import tiles as s\n"
-        "s.write_json = lambda path, data: os._exit(9)\n"
-        "s.divide(Path(sys.argv[1]), Path(sys.argv[2]), s.Cut(2.0, 0.25), [])"
-    )
-    run = subprocess.run([sys.executable, "-c", code, str(scene), str(tmp_path / "parts")])
-    assert run.returncode == 9
-    assert (tmp_path / "parts" / "0-0-0.ply").exists()
-    assert len(split(scene, **TILES).labels) == 6
 
 
 def test_normals_and_colours_stay(tmp_path):

@@ -142,10 +142,3 @@ def test_what_is_refused_leaves_no_folder_behind(scene, tmp_path, options, messa
     with pytest.raises(InvalidParameterError, match=message):
         run_batch(scene, tmp_path / "deep" / "out", **options)
     assert not (tmp_path / "deep").exists()
-
-
-def test_a_scene_that_cannot_be_read_fails_with_its_reason(tmp_path, run):
-    (tmp_path / "bad.ply").write_text("no")
-    run(tmp_path / "bad.ply", tiles=1.0)
-    assert run.result.rows["bad"]["error"].startswith("not a valid .ply file")
-    assert not list((tmp_path / "out").rglob("*.ply"))

@@ -11,7 +11,6 @@ import pytest
 import glsk_o3d as glsk
 from glsk_o3d import to_pymeshlab
 from glsk_o3d.analysis import segment
-from glsk_o3d.apps.meshlab import builtin
 from glsk_o3d.apps.meshlab.layers import Layer
 from glsk_o3d.apps.meshlab.script import read_script
 from glsk_o3d.apps.meshlab.steps import read_steps
@@ -155,13 +154,6 @@ def test_scripts_keep_percentages(tmp_path):
     np.testing.assert_allclose(large.current_mesh().vertex_matrix(), expected, rtol=1e-9, atol=1e-9)
 
 
-def test_points_that_are_dropped_have_no_part_in_the_box():
-    spoilt = Layer.of(np.concatenate([LARGER, [[np.nan, 1e6, 0], [0, np.inf, 0]]]))
-    params = {"connector_radius": "5%", "sampler_drop_invalid": True}
-    found, clean = (verbs()[WHOLE].run(layer, params) for layer in (spoilt, Layer.of(LARGER)))
-    same(found.skeleton, clean.skeleton)
-
-
 # ---- layers
 
 
@@ -260,24 +252,6 @@ def test_listings_have_both_kinds(capfd, meshes):
     meshes.generate_curve_skeleton_glsk(ringbuilder_k=9)
     meshes.print_filter_script()
     assert '<Param type="RichInt" name="ringbuilder_k" value="9"/>' in capfd.readouterr().out
-
-
-def test_which_parameters_are_layers():
-    later = pymeshlab.MeshSet()
-    for _ in range(3):
-        later.add_mesh(builtin.trial().mesh(0))
-    for number in (0, 1):
-        later.set_current_mesh(number)
-        later.delete_current_mesh()
-    later.set_current_mesh(2)
-    unlike_elsewhere = set()
-    for name in pymeshlab.filter_list():
-        here, there = builtin.trial().filter_parameter_values(name), later.filter_parameter_values(name)
-        ours = {key for key, value in here.items() if builtin.is_layer(key, value)}
-        theirs = {key for key, value in here.items() if type(value) is int and value != there[key]}
-        assert theirs <= ours
-        unlike_elsewhere |= ours - theirs
-    assert unlike_elsewhere == {"referencemesh", "sourcemesh", "basemesh"}  # the first layer, whatever there is
 
 
 def test_a_skeleton_as_a_mesh_of_meshlab(skeleton, tmp_path, monkeypatch):
