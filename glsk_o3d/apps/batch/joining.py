@@ -107,19 +107,19 @@ class Strands:
 
     def touching(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         """Vertices in a box, or with an edge whose middle is, (n,) bool array."""
-        found = inside(self.values, low, high)
-        found[self.edges[inside(self.middles, low, high)]] = True
-        return found
+        touches = inside(self.values, low, high)
+        touches[self.edges[inside(self.middles, low, high)]] = True
+        return touches
 
     def outward(self) -> np.ndarray:
         """At every cut end at the border the direction in which its curve would go on, (n, 3) float array; else 0."""
         a, b = self.edges.T
         step = self.values[b, :3] - self.values[a, :3]
         step = step / np.maximum(norm(step), np.finfo(float).tiny)[:, None]
-        found = np.zeros((len(self.values), 3))
-        np.add.at(found, b, step)
-        np.add.at(found, a, -step)
-        return found * self.marks[:, [BORDER]]
+        directions = np.zeros((len(self.values), 3))
+        np.add.at(directions, b, step)
+        np.add.at(directions, a, -step)
+        return directions * self.marks[:, [BORDER]]
 
     def mended(self) -> Strands:
         """Without the vertices that were made in vain, in the middle of edges that went on."""
@@ -182,7 +182,7 @@ def join_tiles(skeletons: Mapping[Tile, Skeleton], grid: Grid) -> tuple[Skeleton
     joint = _Joint()
     brought: dict[Tile, Samples] = {}
     for tile in sorted(skeletons):
-        near = [each for each in brought if max(abs(a - b) for a, b in zip(each, tile, strict=True)) <= 1]
+        near = [other for other in brought if max(abs(a - b) for a, b in zip(other, tile, strict=True)) <= 1]
         strands = Strands.of(skeletons[tile]).within(*grid.box(tile, grid.trust))
         # the skeleton of a part within reach of a cut through the points is not to be trusted
         cut = ~inside(strands.values, *grid.box(tile, grid.overlap), CUT_REACH * strands.values[:, 3])
@@ -190,7 +190,7 @@ def join_tiles(skeletons: Mapping[Tile, Skeleton], grid: Grid) -> tuple[Skeleton
         strands = strands.with_pieces(strands.touching(*grid.box(tile, CLAIM_SHARE * grid.trust)))
         theirs = None
         if near:
-            theirs = Samples(*map(np.concatenate, zip(*(brought[each] for each in near), strict=True)))
+            theirs = Samples(*map(np.concatenate, zip(*(brought[other] for other in near), strict=True)))
         if theirs is not None and len(theirs.places):
             strands, met = _not_there(strands, theirs, grid, tile, near)
             joint.met.append(met)
@@ -204,18 +204,16 @@ def _not_there(
     """What others have not brought, and the values of the ends of the object that they have."""
     for axis, value in grid.seams(tile):
         strands = strands.split(axis, value)
-    there = _covered(strands.middles, theirs)
+    known = _covered(strands.middles, theirs)
     ends = (strands.degree == 1) & ~strands.marks[:, BORDER]
-    ends[strands.edges[~there]] = False
-    left = strands.keep(~there, ~_covered(strands.values, theirs), INNER)
+    ends[strands.edges[~known]] = False
+    new = strands.keep(~known, ~_covered(strands.values, theirs), INNER)
     # a stretch of a curve that others saw, too, and elsewhere, is theirs; unless they have nothing there at all
-    middles = left.middles
-    seen = np.any([inside(middles, *grid.box(each, grid.trust), middles[:, 5]) for each in near], axis=0)
-    leaves = np.zeros(len(left.values), bool)
-    leaves[left.edges[~seen]] = True
-    pieces = left.pieces
-    leaves |= ~np.isin(pieces, pieces[left.marks[:, INNER]])
-    return left.with_pieces(leaves).mended(), strands.values[ends]
+    middles, labels = new.middles, new.pieces
+    seen = np.any([inside(middles, *grid.box(other, grid.trust), middles[:, 5]) for other in near], axis=0)
+    own = ~np.isin(labels, labels[new.marks[:, INNER]])
+    own[new.edges[~seen]] = True
+    return new.with_pieces(own).mended(), strands.values[ends]
 
 
 def _covered(values: np.ndarray, theirs: Samples) -> np.ndarray:
@@ -261,7 +259,7 @@ class _Joint:
         """Match cut ends with open ones, the nearest first, one to one; others touch what is nearest."""
         known = set(theirs.vertex.tolist())
         waiting = {at: values for at, values in self._open.items() if at in known}
-        mine, others = (np.array(list(each.values())).reshape(-1, 8) for each in (ends, waiting))
+        mine, others = (np.array(list(points.values())).reshape(-1, 8) for points in (ends, waiting))
         one_of, other_of = list(ends), list(waiting)
         loose = dict(ends)
         for row, column in matched(mine[:, :3], others[:, :3], mine[:, None, 5] + others[:, 5]):

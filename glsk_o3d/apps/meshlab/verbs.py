@@ -159,8 +159,8 @@ class CrossCheckVerb(Verb):
 
     def run(self, layer: Layer, given: Mapping[str, Any], on_iteration: Callable[..., Any] | None = None) -> Layer:
         check = cross_check(layer.cloud(), pipeline=self.plan(given), mesh=given.get("mesh", "auto"))
-        told = {"verdict": check.verdict, "probability": check.probability, "because": check.reasons}
-        return dataclasses.replace(self.shown(check.points, layer), scalars=check.angle, told=told)
+        results = {"verdict": check.verdict, "probability": check.probability, "because": check.reasons}
+        return dataclasses.replace(self.shown(check.points, layer), scalars=check.angle, results=results)
 
 
 @cache
@@ -179,12 +179,12 @@ def verbs() -> dict[str, Verb]:
     layer = Slot("layer", parameter(None, "The layer to act on; -1 is the current one.", type="int", low=-1).metadata)
     slots = {slot.name: slot for slot in (*_slots_of_all(), layer)}
     of_check = {"pipeline": slots["pipeline"], "mesh": mesh, "layer": layer}
-    found = [
+    known = [
         Verb("generate_curve_skeleton_glsk", whole, slots, "a skeleton"),
         SegmentVerb("generate_segmented_cloud_glsk", segmented, {"layer": layer}, "points or a mesh"),
         CrossCheckVerb("get_curve_skeleton_crosscheck_glsk", checked, of_check, "points"),
     ]
-    return {verb.name: verb for verb in found}
+    return {verb.name: verb for verb in known}
 
 
 def _slots_of_all() -> list[Slot]:
