@@ -53,11 +53,7 @@ def test_from_a_program_to_a_table(invoke, bench, program, tmp_path):
         (2, ("make", "new", "--seeds", "a:b"), "--seeds a:b: write FIRST:BEYOND"),
         (2, ("make", "new", "--families", "tube"), "did you mean 'tubes'"),
         (1, ("run", "none", "out"), "make a benchmark with 'glsk benchmark make none' first"),
-        (2, ("run", "bench", "out", "--command", "true {cloud}"), "has no {skeleton}"),
-        (1, ("score", "bench", "none", "-o", "s.json"), "no such folder of answers"),
         (2, ("score", "bench", "bench", "-o", "s.csv"), "its name ends in .json"),
-        (1, ("sample", "new", "none"), "none: has no meshes"),
-        (1, ("table", "bench/benchmark.json"), "not the scores of a benchmark"),
         (2, ("table", "bench/benchmark.json", "-o", "t.csv"), "its name ends in .md or .json"),
     ],
 )
