@@ -24,6 +24,7 @@ def test_what_it_says_and_writes(invoke, scans, tmp_path):
     first, *lines = run.stdout.splitlines()
     assert first.endswith("name.ply: agrees")
     assert "loops 1 and 1" in " ".join(run.stdout.split())
+    assert "eigenvalues" not in run.stdout  # which JSON has
     assert lines[-3:] == ["wrote marked.ply", "wrote both.png", "wrote page.html"]
     marked = read_tensor_cloud(tmp_path / "marked.ply")
     np.testing.assert_array_equal(marked.point.angle.numpy()[:, 0], check.angle)
