@@ -23,7 +23,8 @@ MOST_SAMPLES = 1000  # derived: places on an edge, where the part has no thickne
 CLAIM_SHARE = 0.5  # fitted: of how far beyond its box a tile counts, up to where a piece must come to be its own
 LONGEST_STUB = 2.0  # fitted: of its scale, up to which what ends at a seam is the foot of a limb that forks beyond it
 
-
+RADIUS, SCALE = 3, 5
+"""Columns of the values of `Strands`."""
 MADE, BORDER, INNER = 0, 1, 2
 """Columns of marks: vertices put where an edge crosses a plane, cut ends at the border of what counts, and cut ends
 where the curve goes on in what is there already."""
@@ -185,8 +186,8 @@ def join_tiles(skeletons: Mapping[Tile, Skeleton], grid: Grid) -> tuple[Skeleton
         near = [other for other in brought if max(abs(a - b) for a, b in zip(other, tile, strict=True)) <= 1]
         strands = Strands.of(skeletons[tile]).within(*grid.box(tile, grid.trust))
         # the skeleton of a part within reach of a cut through the points is not to be trusted
-        cut = ~inside(strands.values, *grid.box(tile, grid.overlap), CUT_REACH * strands.values[:, 3])
-        joint.thickest = float(np.nanmax(strands.values[cut, 3], initial=joint.thickest))
+        cut = ~inside(strands.values, *grid.box(tile, grid.overlap), CUT_REACH * strands.values[:, RADIUS])
+        joint.thickest = float(np.nanmax(strands.values[cut, RADIUS], initial=joint.thickest))
         strands = strands.with_pieces(strands.touching(*grid.box(tile, CLAIM_SHARE * grid.trust)))
         theirs = None
         if near:
@@ -210,7 +211,7 @@ def _not_there(
     new = strands.keep(~known, ~_covered(strands.values, theirs), INNER)
     # a stretch of a curve that others saw, too, and elsewhere, is theirs; unless they have nothing there at all
     middles, labels = new.middles, new.pieces
-    seen = np.any([inside(middles, *grid.box(other, grid.trust), middles[:, 5]) for other in near], axis=0)
+    seen = np.any([inside(middles, *grid.box(other, grid.trust), middles[:, SCALE]) for other in near], axis=0)
     own = ~np.isin(labels, labels[new.marks[:, INNER]])
     own[new.edges[~seen]] = True
     return new.with_pieces(own).mended(), strands.values[ends]
@@ -220,7 +221,7 @@ def _covered(values: np.ndarray, theirs: Samples) -> np.ndarray:
     """Which places are on curves that are there: no farther from them than either is thick, and not past a cut end."""
     distance, nearest = cKDTree(theirs.places).query(values[:, :3])
     past = dot(values[:, :3] - theirs.places[nearest], theirs.outward[nearest]) > 0
-    return (distance <= np.fmax(values[:, 5], theirs.scale[nearest])) & ~past
+    return (distance <= np.fmax(values[:, SCALE], theirs.scale[nearest])) & ~past
 
 
 class _Joint:
@@ -246,14 +247,14 @@ class _Joint:
             assert theirs is not None
             self._meet({first + at: strands.values[at] for at in np.flatnonzero(inner).tolist()}, theirs)
         places, edges = strands.values[:, :3], strands.edges
-        scale = np.fmax(np.fmin(*strands.values[edges, 5].T), np.finfo(float).tiny)
+        scale = np.fmax(np.fmin(*strands.values[edges, SCALE].T), np.finfo(float).tiny)
         step = np.fmax(SAMPLE_STEP * scale, norm(places[edges[:, 1]] - places[edges[:, 0]]) / MOST_SAMPLES)
         row, part = pieces(places, edges, step) if len(edges) else (np.empty(0, int), np.empty(0))
         between = along(edges, row, part, strands.values) if len(edges) else np.empty((0, 8))
         values = np.concatenate([strands.values, between])
         vertex = np.concatenate([np.arange(len(places)), edges[row, (part > 0.5).astype(int)]])
         outward = np.concatenate([strands.outward(), np.zeros((len(row), 3))])
-        return Samples(values[:, :3], values[:, 5], first + vertex, outward)
+        return Samples(values[:, :3], values[:, SCALE], first + vertex, outward)
 
     def _meet(self, ends: dict[int, np.ndarray], theirs: Samples) -> None:
         """Match cut ends with open ones, the nearest first, one to one; others touch what is nearest."""
@@ -262,7 +263,7 @@ class _Joint:
         mine, others = (np.array(list(points.values())).reshape(-1, 8) for points in (ends, waiting))
         one_of, other_of = list(ends), list(waiting)
         loose = dict(ends)
-        for row, column in matched(mine[:, :3], others[:, :3], mine[:, None, 5] + others[:, 5]):
+        for row, column in matched(mine[:, :3], others[:, :3], mine[:, None, SCALE] + others[:, SCALE]):
             one, other = one_of[row], other_of[column]
             self._merged.append((one, other))
             del loose[one], self._open[other]
@@ -292,7 +293,7 @@ class _Joint:
         met = np.concatenate(self.met)
         if len(met):  # where an end of the object is beside a cut end, another tile saw it: there is nothing to meet
             distance, nearest = cKDTree(met[:, :3]).query(values[ends, :3])
-            ends = ends[distance > values[ends, 5] + met[nearest, 5]]
+            ends = ends[distance > values[ends, SCALE] + met[nearest, SCALE]]
         seams = Seams(len(other) + len(touching) - len(loose), len(ends), self.thickest)
         number, kept, none = np.cumsum(alive) - 1, values[alive], np.empty((0, 3))
         edges = simple_edges(number[edges])
@@ -308,7 +309,7 @@ def _stubs(values: np.ndarray, edges: np.ndarray, ends: np.ndarray) -> tuple[lis
         path = path if path[0] in others else path[::-1]
         if path[0] in others and degree[path[-1]] > 2:
             length = norm(np.diff(values[path, :3], axis=0)).sum()
-            if length <= LONGEST_STUB * values[path[0], 5]:
+            if length <= LONGEST_STUB * values[path[0], SCALE]:
                 stubs += path[:-1]
                 others.remove(path[0])
                 degree[path[-1]] -= 1

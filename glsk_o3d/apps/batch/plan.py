@@ -49,11 +49,6 @@ class Plan:
     ledger : Ledger
     left_out : dict of str to str
         Skipped files in the folders, with the reason.
-
-    Examples
-    --------
-    >>> plan = plan_batch("scans", "skeletons", recursive=True)  # doctest: +SKIP
-    >>> [(task.source, task.why) for task in plan.todo]  # doctest: +SKIP
     """
 
     out_dir: Path
