@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from itertools import count
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -62,29 +62,23 @@ def batch(
     if dry_run:
         _tell_plan(batches.plan_batch(inputs, output, **what))
         return
+    plans: list[batches.Plan] = []
+    done = count(1)
     with progress(remaining=True) as update:
         update("looking for what is done")
-        watch = _Watch(update)
-        what |= dict(workers=workers, scheduler=scheduler, on_plan=watch.begin, on_result=watch.step)
+
+        def begin(plan: batches.Plan) -> None:
+            plans.append(plan)
+            _say_left_out(plan)
+
+        def step(row: dict[str, Any]) -> None:
+            update(f"done: {row['input']}", next(done), len(plans[0].todo))
+            if row["status"] == "failed" and not flags.quiet:
+                say("warning", f"{row['input']}: {row['error']}")
+
+        what |= dict(workers=workers, scheduler=scheduler, on_plan=begin, on_result=step)
         result = batches.run_batch(inputs, output, **what)
-    _tell_result(result, watch.left_out)
-
-
-class _Watch:
-    """Shows how far a batch is; says what fails as soon as it does."""
-
-    def __init__(self, update: Callable[..., None]) -> None:
-        self._update, self._done = update, 0
-
-    def begin(self, plan: batches.Plan) -> None:
-        self._total, self.left_out = len(plan.todo), plan.left_out
-        _say_left_out(plan)
-
-    def step(self, row: dict[str, Any]) -> None:
-        self._done += 1
-        self._update(f"done: {row['input']}", self._done, self._total)
-        if row["status"] == "failed" and not flags.quiet:
-            say("warning", f"{row['input']}: {row['error']}")
+    _tell_result(result, plans[0].left_out)
 
 
 def _tell_result(result: batches.BatchResult, left_out: dict[str, str]) -> None:
@@ -92,14 +86,13 @@ def _tell_result(result: batches.BatchResult, left_out: dict[str, str]) -> None:
     from ..errors import BatchError
 
     rows = result.rows.values()
-    failed = [{"input": row["input"], "error": row["error"]} for row in rows if row["status"] == "failed"]
+    failures = [{"input": row["input"], "error": row["error"]} for row in rows if row["status"] == "failed"]
     facts: dict[str, Any] = {name: getattr(result, name) for name in ("done", "skipped", "failed")}
     facts |= {"seconds": round(result.seconds, 3), "clouds_per_second": round(result.rate, 3)}
-    facts |= {"with_warnings": sum(bool(row.get("warnings")) for row in rows)}
-    facts |= {"ledger": str(result.ledger)}
-    tell({**facts, "failures": failed, "left_out": left_out}, lambda: print_rows(facts))
-    if failed:
-        raise BatchError(f"{len(failed)} of {len(rows)} scans failed: {result.ledger} says why")
+    facts |= {"with_warnings": sum(bool(row.get("warnings")) for row in rows), "ledger": str(result.ledger)}
+    tell({**facts, "failures": failures, "left_out": left_out}, lambda: print_rows(facts))
+    if failures:
+        raise BatchError(f"{len(failures)} of {len(rows)} scans failed: {result.ledger} says why")
 
 
 def _tell_plan(plan: batches.Plan) -> None:

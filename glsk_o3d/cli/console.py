@@ -22,7 +22,7 @@ flags = SimpleNamespace(quiet=False, verbose=False, as_json=False)
 
 def visible(text: str) -> str:
     """Text in which what terminals obey, but line ends and tabs, stands as Python writes it."""
-    return re.sub(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]", lambda found: repr(found[0])[1:-1], text)
+    return re.sub(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]", lambda match: repr(match[0])[1:-1], text)
 
 
 def echo(text: str = "", **style: Any) -> None:
@@ -120,8 +120,8 @@ def value_in_words(value: Any, digits: int = 6) -> str:
         digits = len(f"{abs(value):.0f}") + 3 if 1000 <= abs(value) < 1e12 else digits
         return "not known" if math.isnan(value) else f"{value:.{digits}g}"
     if isinstance(value, dict):
-        known = {name.replace("_", " "): each for name, each in value.items() if each is not None}
-        return ", ".join(f"{name} {value_in_words(each)}" for name, each in known.items())
+        known = ((name.replace("_", " "), item) for name, item in value.items() if item is not None)
+        return ", ".join(f"{name} {value_in_words(item)}" for name, item in known)
     if isinstance(value, list | tuple):
         return ("\n" if isinstance(value, list) else " ").join(map(value_in_words, value))
     return str(value)

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from ..errors import did_you_mean
 from .console import print_rows, progress, value_in_words
 from .options import DropInvalid, PipelineName, Preview, ReportPage, ScanFile, option
-from .outputs import Output, check_outputs, tell, write_each
+from .outputs import PAGE, PICTURE, Output, check_outputs, tell, write_each
 from .reporting import WrongUsage
 
 MOST_PARTS = 3  # of the mesh that are told of
@@ -47,8 +47,8 @@ def crosscheck(
 
     outputs = [
         Output(labelled, (".ply",), "file is a cloud with angles", _save_angles),
-        Output(preview, (".png",), "picture is a PNG", _save_picture),
-        Output(report, (".html", ".htm"), "report is a page", _save_page),
+        Output(preview, *PICTURE, _save_picture),
+        Output(report, *PAGE, _save_page),
     ]
     own = None if mesh in MADE_BY else Path(mesh)
     if own and not own.suffix:
@@ -57,39 +57,37 @@ def crosscheck(
     chosen = choose(pipeline, drop_invalid=drop_invalid)
     with progress() as update:
         update(f"reading {scan.name}")
-        held = read_scan(scan)
-        cloud = SurfaceMesh(held.positions, held.triangles)
+        whole = read_scan(scan)
+        cloud = SurfaceMesh(whole.positions, whole.triangles)
         surface = read_mesh(own) if own else mesh
         update("comparing with a mesh")
         check = cross_check(cloud, pipeline=chosen, mesh=surface)
         files = write_each(outputs, check, update)
     facts = {"scan": printable(scan), **check.to_dict()}
-    tell(facts, lambda: print_rows(_told(check), title=f"{scan}: {check.verdict}"), files)
+    tell(facts, lambda: print_rows(_rows(check), title=f"{scan}: {check.verdict}"), files)
 
 
-def _told(check: Any) -> dict[str, Any]:
+def _rows(check: Any) -> dict[str, Any]:
     """The facts that people read: without eigenvalues, places that the reasons have, and all but the largest parts."""
     facts = check.to_dict()
-    mesh, skeletons = facts["mesh"], _without(facts["skeletons"], "missing", "extra", "closest_call")
-    parts = [value_in_words(part, 4) for part in mesh["parts"][:MOST_PARTS]]
-    more = len(mesh["parts"]) - len(parts)
+    parts = [value_in_words(part, 4) for part in facts["mesh"]["parts"]]
+    if len(parts) > MOST_PARTS:
+        parts[MOST_PARTS:] = [f"and {len(parts) - MOST_PARTS} more"]
+    hidden = {"parts", "faults", "eigenvalues", "missing", "extra", "closest_call"}
+    mesh, laplacians, skeletons = (
+        {name: value for name, value in facts[group].items() if name not in hidden}
+        for group in ("mesh", "rows", "skeletons")
+    )
     return {
         "because": facts["reasons"],
         "worth": MEANINGS[check.verdict],
         "probability": round(check.probability, 3),
         "points": facts["points"],
-        "mesh": _without(mesh, "parts", "faults"),
-        "parts": [*parts, f"and {more} more"] if more else parts,
-        "laplacians": _without(facts["rows"], "eigenvalues"),
-        "skeletons": {
-            name: f"{value[0]} and {value[1]}" if isinstance(value, tuple) else value
-            for name, value in skeletons.items()
-        },
+        "mesh": mesh,
+        "parts": parts,
+        "laplacians": laplacians,
+        "skeletons": {name: " and ".join(map(str, v)) if isinstance(v, tuple) else v for name, v in skeletons.items()},
     }
-
-
-def _without(told: dict[str, Any], *names: str) -> dict[str, Any]:
-    return {name: value for name, value in told.items() if name not in names}
 
 
 def _save_angles(check: Any, path: Path) -> None:
@@ -108,8 +106,6 @@ def _save_picture(check: Any, path: Path) -> None:
 def _save_page(check: Any, path: Path) -> None:
     from .. import save_report
 
-    told = {
-        name: value_in_words(value).replace("\n", "; ")
-        for name, value in ({"verdict": check.verdict} | _told(check)).items()
-    }
-    save_report(check.skeleton, path, title=path.stem, facts={"Cross-check": told})
+    rows = {"verdict": check.verdict, **_rows(check)}
+    texts = {name: value_in_words(value).replace("\n", "; ") for name, value in rows.items()}
+    save_report(check.skeleton, path, title=path.stem, facts={"Cross-check": texts})

@@ -26,7 +26,7 @@ def filters(
     known, pipelines = catalogue(), known_pipelines()
     if name is not None and name not in known and name not in pipelines:
         raise WrongUsage(did_you_mean(name, [*known, *pipelines], "filter or pipeline"))
-    found = {
+    facts = {
         "filters": [_filter_facts(cls) for key, cls in known.items() if name in (None, key)],
         "pipelines": [
             {"name": key, "kind": "pipeline", **_origin(make), "expression": " | ".join(map(repr, make().stages))}
@@ -36,10 +36,10 @@ def filters(
     }
 
     def words() -> None:
-        for facts in chain(*found.values()):
-            _print(facts, full=name is not None)
+        for item in chain(*facts.values()):
+            _print(item, full=name is not None)
 
-    tell(found, words)
+    tell(facts, words)
 
 
 def _filter_facts(cls: type[Parameters]) -> dict[str, Any]:
@@ -53,8 +53,8 @@ def _filter_facts(cls: type[Parameters]) -> dict[str, Any]:
         flow = {name: "cloud" if kind is Cloud else kind.__name__ for name, kind in kinds.items()}
     kind = "filter" if flow["consumes"] else "stopping rule"
     fields = dataclasses.fields(cls)  # type: ignore[arg-type]
-    defaults = [repr(each.default) if dataclasses.is_dataclass(each.default) else each.default for each in fields]
-    parameters = [{"name": f.name, **f.metadata, "default": told} for f, told in zip(fields, defaults, strict=True)]
+    plain = {f.name: repr(f.default) if dataclasses.is_dataclass(f.default) else f.default for f in fields}
+    parameters = [{"name": f.name, **f.metadata, "default": plain[f.name]} for f in fields]
     return {"name": cls.__name__, "kind": kind, **_origin(cls), **flow, "parameters": parameters}
 
 
@@ -75,8 +75,8 @@ def _print(facts: dict[str, Any], *, full: bool) -> None:
     echo(f"{facts['name']}  {flow}" + f", from {facts['plugin']}" * bool(facts["plugin"]), bold=True)
     print_table([[facts["doc"] if full else facts["doc"].partition("\n\n")[0]]], wrap=True)
     rows = [("", facts["expression"])] if facts["kind"] == "pipeline" else []
-    for each in facts.get("parameters", ()):
-        default = "none" if each["default"] is None else each["default"]
-        rows.append((f"  {each['name']}", f"{each['doc']}\n{allowed_values(each)}; default {default}"))
+    for option in facts.get("parameters", ()):
+        default = "none" if option["default"] is None else option["default"]
+        rows.append((f"  {option['name']}", f"{option['doc']}\n{allowed_values(option)}; default {default}"))
     print_table(rows, wrap=True)
     echo()

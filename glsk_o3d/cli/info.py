@@ -1,4 +1,4 @@
-"""``glsk info``: what is in a file."""
+"""``glsk info`` and ``glsk view``: what is in a file, in numbers and to look at."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from .console import print_rows, print_table
-from .options import Where, argument
-from .outputs import tell
+from .options import Where, argument, option
+from .outputs import check_outputs, skeleton_outputs, tell, write_each
 
 if TYPE_CHECKING:
     from ..data.skeleton import Skeleton
@@ -54,35 +54,34 @@ def _cloud_facts(file: Path, where: str | None) -> dict[str, Any]:
     from ..io.streaming import LARGE_CLOUD
 
     large = (promised_points(file) or 0) > LARGE_CLOUD
-    n, lost, ends = 0, 0, []
-    known: dict[str, dict[str, Any]] = {}
+    n, n_finite, corners = 0, 0, [np.full(3, np.nan)]
+    attributes: dict[str, dict[str, Any]] = {}
     for block in read_blocks(file, where=where) if large else [read_scan(file, where)]:
         finite = block.positions[np.isfinite(block.positions).all(axis=1)]
-        n, lost = n + len(block), lost + len(block) - len(finite)
-        ends += [finite.min(axis=0), finite.max(axis=0)] if len(finite) else []
+        n, n_finite = n + len(block), n_finite + len(finite)
+        corners += [finite.min(axis=0), finite.max(axis=0)] if len(finite) else []
         for name, values in block.attributes.items():
-            known[name] = _together(known.get(name, {}), values)
+            attributes[name] = _attribute_facts(attributes.get(name, {}), values)
     whole: dict[str, Any] = {}
     if not large:
-        distinct = finite[first_in_their_place(finite)]
-        spacing = np.nan
+        distinct, spacing = finite[first_in_their_place(finite)], np.nan
         if len(distinct) > 1:
             asked = distinct[:: len(distinct) // SPACING_POINTS + 1]
             spacing = np.median(nearest_neighbours(distinct, 2, of=asked)[0][:, 1])
         whole = {"triangles": len(block.triangles) or None, "duplicates": len(finite) - len(distinct)}
         whole["median_spacing"] = float(spacing)  # to the nearest other point
-    low, high = (np.min(ends, axis=0), np.max(ends, axis=0)) if ends else (np.full(3, np.nan),) * 2
+    low, high = np.fmin.reduce(corners), np.fmax.reduce(corners)
     return {
-        **{"kind": "cloud", "points": n, "not_finite": lost},
+        **{"kind": "cloud", "points": n, "not_finite": n - n_finite},
         **whole,
         **{"lowest": low.tolist(), "highest": high.tolist(), "diagonal": float(np.linalg.norm(high - low))},
         **{"colours": block.colors is not None, "normals": block.normals is not None},
-        "attributes": known or None,
+        "attributes": attributes or None,
     }
 
 
-def _together(before: dict[str, Any], values: Any) -> dict[str, Any]:
-    """The range of an attribute, and how many points have each value if these are few, with those of more points."""
+def _attribute_facts(before: dict[str, Any], values: Any) -> dict[str, Any]:
+    """The range of an attribute, and how many points have each value if these are few, with those of earlier points."""
     import numpy as np
 
     known = values[np.isfinite(values)] if values.dtype.kind == "f" else values
@@ -96,6 +95,24 @@ def _together(before: dict[str, Any], values: Any) -> dict[str, Any]:
     if len(counts) <= FEW_VALUES and (not before or "counts" in before):
         facts["counts"] = {name: counts[name] for name in sorted(counts, key=float)}
     return facts
+
+
+def _skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
+    """What there is to know about a skeleton and the run that made it; None for what its file lacks."""
+    import numpy as np
+
+    from ..analysis.summary import structure
+
+    report, radii = skeleton.report, skeleton.radii[np.isfinite(skeleton.radii)]
+    facts = {
+        "kind": "skeleton",
+        **structure(skeleton),
+        "radii": (float(radii.min()), float(radii.max())) if len(radii) else None,
+        "points": len(skeleton.points) or None,
+    }
+    run = {name: getattr(report, name) for name in ("stages", "converged", "stop_reason", "versions")}
+    run |= {name: list(getattr(report, name)) for name in ("uncertain", "unsupported", "warnings")}
+    return {**facts, **run} if report.stages else facts
 
 
 def _in_words(facts: dict[str, Any]) -> dict[str, Any]:
@@ -113,20 +130,34 @@ def _range(attribute: dict[str, Any]) -> str:
     return f"{attribute['lowest']:.10g} to {attribute['highest']:.10g}" if attribute else "unknown"
 
 
-def _skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
-    """What there is to know about a skeleton and the run that made it; None for what its file lacks."""
+def view(
+    file: Annotated[Path, argument("SKELETON|SCAN", "In any format that is read.")],
+    preview: Annotated[Path | None, option("PNG", "Open no window: draw a picture.")] = None,
+    report: Annotated[Path | None, option("HTML", "Open no window: write a page for the browser.")] = None,
+) -> None:
+    """Look at a skeleton or a scan in a window.
+
+    That needs a display; --preview and --report make files instead. In the window, C, S and T show and hide the cloud,
+    the skeleton, and its tubes of true radius; H helps, Q closes. A scan has its colours there, and is grey in
+    files.
+    """
     import numpy as np
 
-    from ..analysis.summary import structure
+    from .. import Skeleton, read_skeleton
+    from ..io.scans import read_scan
+    from ..io.skeletons import holds_skeleton
+    from ..viewing.window import show
 
-    report = skeleton.report
-    radii = skeleton.radii[np.isfinite(skeleton.radii)]
-    facts = {
-        "kind": "skeleton",
-        **structure(skeleton),
-        "radii": (float(radii.min()), float(radii.max())) if len(radii) else None,
-        "points": len(skeleton.points) or None,
-    }
-    told = {name: getattr(report, name) for name in ("stages", "converged", "stop_reason", "versions")}
-    told |= {name: list(getattr(report, name)) for name in ("uncertain", "unsupported", "warnings")}
-    return {**facts, **told} if report.stages else facts
+    outputs = skeleton_outputs([], preview, report, title=file.name)
+    check_outputs(outputs, file)
+    cloud = None
+    if holds_skeleton(file):
+        skeleton = read_skeleton(file)
+    else:
+        scan = read_scan(file)
+        cloud, none, n = scan.to_legacy(), np.empty(0), len(scan.positions)
+        skeleton = Skeleton(none, none, none, np.full(n, -1), scan.positions, np.full((n, 3), np.nan))
+    if preview is None and report is None:
+        show(skeleton, cloud, title=file.name)
+    else:
+        tell({}, lambda: None, write_each(outputs, skeleton))

@@ -17,15 +17,12 @@ from .batch import batch
 from .console import echo, say
 from .crosscheck import crosscheck
 from .edit import convert, edit, rig
-from .evaluate import evaluate
 from .filters import filters
-from .grasps import grasps
-from .info import info
-from .measures import branches, tree
+from .info import info, view
+from .measures import branches, evaluate, grasps, tree
 from .reporting import FAILURE_CODE, as_command, reporting
 from .run import run
 from .skeletonize import demo, skeletonize
-from .view import view
 
 EPILOG = (
     "Exit codes: 0 all went well; 1 the input or the run failed; 2 the command line is wrong; 130 interrupted. "
@@ -68,8 +65,8 @@ ANALYSES = (evaluate, crosscheck, branches, tree, grasps)
 def add_plugged(app: typer.Typer) -> None:
     """Add the commands of other distributions; the benchmark says how to get it where it is not there."""
     problems: list[str] = []
-    found = {entry.name: entry for entry in entry_points(COMMAND_GROUP, problems)}
-    for name, entry in sorted(found.items()):
+    entries = {entry.name: entry for entry in entry_points(COMMAND_GROUP, problems)}
+    for name, entry in sorted(entries.items()):
         try:
             plugged = entry.load()
             if not isinstance(plugged, typer.Typer):
@@ -79,7 +76,7 @@ def add_plugged(app: typer.Typer) -> None:
             problems.append(f"the command {name!r} ({entry.value}) is left out: {error}")
     for problem in problems:
         say("warning", problem)
-    if "benchmark" not in found:
+    if "benchmark" not in entries:
         settings = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
         app.command("benchmark", context_settings=settings)(_absent_benchmark)
 

@@ -24,11 +24,14 @@ class Output(NamedTuple):
     save: Callable[[Any, Path], object]
 
 
+PICTURE, PAGE = ((".png",), "picture is a PNG"), ((".html", ".htm"), "report is a page")
+"""What two kinds of outputs are."""
+
+
 def skeleton_outputs(
     skeletons: Iterable[Path] | None,
     preview: Path | None = None,
     page: Path | None = None,
-    *,
     title: str = "",
     cut_loops: bool = False,
 ) -> list[Output]:
@@ -39,8 +42,8 @@ def skeleton_outputs(
     save = partial(save_skeleton, cut_loops=cut_loops)
     return [
         *(Output(path, endings, "file is a skeleton", save) for path in skeletons or []),
-        Output(preview, (".png",), "picture is a PNG", partial(save_preview, title=title)),
-        Output(page, (".html", ".htm"), "report is a page", partial(save_report, title=title)),
+        Output(preview, *PICTURE, partial(save_preview, title=title)),
+        Output(page, *PAGE, partial(save_report, title=title)),
     ]
 
 

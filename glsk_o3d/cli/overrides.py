@@ -1,16 +1,12 @@
 """``--set Filter.parameter=value``, or ``--set parameter=value``: a pipeline with some parameters changed."""
 
 from collections.abc import Iterable
-from contextlib import suppress
 from typing import Any
 
 from ..api import as_pipeline
-from ..errors import InvalidParameterError, did_you_mean
-from ..parameters import Parameters
+from ..errors import InvalidParameterError
 from ..pipeline import Pipeline
-from ..recipes.catalogue import catalogue, serves
-
-_BOOLS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
+from ..recipes.catalogue import value_from_text
 
 
 def choose(
@@ -43,24 +39,6 @@ def _parse(setting: str, pipeline: Pipeline[Any, Any]) -> tuple[str, Any]:
             example = "for example Connector.radius=2%"
             raise InvalidParameterError(f"write it as Filter.parameter=value or parameter=value, {example}")
         cls, field = pipeline.class_of_option(f"{owner}{dot}{name}")
-        return f"{cls.__name__}.{name}", _value(cls, field.metadata["type"], text)
+        return f"{cls.__name__}.{name}", value_from_text(text, field.metadata, cls.__name__)
     except InvalidParameterError as error:
         raise InvalidParameterError(f"--set {setting}: {error}") from None
-
-
-def _value(cls: type[Parameters], kind: str, text: str) -> Any:
-    """Text as a value of the kind, or as it is where it is none: then the filter's own check says what is wrong."""
-    if kind.endswith("?") and text.lower() == "none":
-        return None
-    kind = kind.rstrip("?")
-    if kind in ("reducer", "stop"):
-        fitting = {name: other for name, other in catalogue().items() if other is not cls and serves(other, kind)}
-        if text not in fitting:
-            raise InvalidParameterError(did_you_mean(text, fitting, kind))
-        return fitting[text]()
-    if kind == "bool":
-        return _BOOLS.get(text.lower(), text)
-    for convert in {"int": (int, float), "float": (float,), "length": (float,)}.get(kind, ()):
-        with suppress(ValueError):
-            return convert(text)
-    return text

@@ -97,8 +97,8 @@ def _as_lines() -> Iterator[None]:
         finally:
             log.removeHandler(handler)
             log.setLevel(before)
-            told = dict.fromkeys(str(it.message) for it in caught if issubclass(it.category, ours))
-            for line in () if flags.quiet else told:
+            messages = dict.fromkeys(str(it.message) for it in caught if issubclass(it.category, ours))
+            for line in () if flags.quiet else messages:
                 say("warning", line)
     for it in caught:
         if not issubclass(it.category, ours):

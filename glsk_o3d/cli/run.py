@@ -29,9 +29,9 @@ def run(
     from ..apps.meshlab.steps import find_script, read_steps
 
     if listed:
-        found = {name: comment(path) for name, path in scripts().items()}
-        told = [{"name": name, "doc": doc} for name, doc in found.items()]
-        tell(told, lambda: print_table(list(found.items()), wrap=True))
+        docs = {name: comment(path) for name, path in scripts().items()}
+        facts = [{"name": name, "doc": doc} for name, doc in docs.items()]
+        tell(facts, lambda: print_table(list(docs.items()), wrap=True))
         return
     if script is None or scan is None:
         raise WrongUsage("a SCRIPT and a SCAN are needed: glsk run SCRIPT SCAN -o FILE, or --list")
@@ -60,8 +60,8 @@ def run(
 
     def words() -> None:
         for i, step in enumerate(results, 1):
-            told = {name: value for name, value in step["result"].items() if name != "warnings"}
-            echo(f"{i}. {step['filter']}: {value_in_words(told)}".removesuffix(": "))
+            facts = {name: value for name, value in step["result"].items() if name != "warnings"}
+            echo(f"{i}. {step['filter']}: {value_in_words(facts)}".removesuffix(": "))
 
     tell({"steps": results}, words, files)
 

@@ -64,10 +64,10 @@ def skeletonize(
     with progress() as update:
         update(f"reading {scan.name}")
         cloud, start = points_for(chosen, scan, where), time.perf_counter()
-        left = "solve {0.iteration}: {1} points are left"
+        solve = "solve {0.iteration}: {1} points remain"
         skeleton = chosen(
             cloud,
-            on_iteration=lambda record: update(left.format(record, record.n_points - record.n_merged)),
+            on_iteration=lambda record: update(solve.format(record, record.n_points - record.n_merged)),
             on_stage=lambda stage: update(type(stage).__name__),
         )
         seconds = time.perf_counter() - start

@@ -1,17 +1,21 @@
 """Filters, stopping rules and pipelines by name, built in and of plugins."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Any
 
 from ..data.contraction import Contraction
 from ..errors import InvalidParameterError, did_you_mean
 from ..interop.packages import FILTER_GROUP, PIPELINE_GROUP
-from ..parameters import Parameters
+from ..parameters import NONE, Parameters
 from ..pipeline import Filter, Pipeline
 from ..pipelines import BUILTIN, PIPELINES
 from .plugins import plugins
 
 __all__ = ["catalogue", "known_pipelines", "named_pipeline"]
+
+
+_TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 
 
 def catalogue() -> dict[str, type[Parameters]]:
@@ -30,6 +34,28 @@ def serves(cls: type[Parameters], kind: str) -> bool:
     if not issubclass(cls, Filter):
         return kind == "stop"
     return kind == "filter" or (kind == "reducer" and cls.consumes is cls.produces is Contraction)
+
+
+def value_from_text(text: str, facts: Mapping[str, Any], owner: str = "") -> Any:
+    """A value from its text, for a parameter of the filter `owner` with the facts that `parameter` makes.
+
+    That is a number, a bool, None, or a reducer or rule from its name, which InvalidParameterError refuses if it is
+    wrong; other text stays as it is, and is for the filter to check.
+    """
+    kind, word = facts["type"].rstrip("?"), text.lower()
+    if word == NONE and facts["type"] != kind:
+        return None
+    if kind in ("reducer", "stop"):
+        fitting = {name: cls for name, cls in catalogue().items() if name != owner and serves(cls, kind)}
+        if text not in fitting:
+            raise InvalidParameterError(did_you_mean(text, fitting, kind))
+        return fitting[text]()
+    if kind == "bool":
+        return {**dict.fromkeys(_TRUE, True), **dict.fromkeys(_FALSE, False)}.get(word, text)
+    for convert in {"int": (int, float), "float": (float,), "length": (float,)}.get(kind, ()):
+        with suppress(ValueError):
+            return convert(text)
+    return text
 
 
 def known_pipelines() -> dict[str, Callable[[], Pipeline[Any, Any]]]:

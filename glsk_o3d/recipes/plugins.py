@@ -31,11 +31,11 @@ def plugins(group: str) -> dict[str, Any]:
     A PluginWarning says once of each that is broken what is wrong; it is left out, and the others are not.
     """
     if group not in _found:
-        found = _found[group] = {}  # already there for plugins that themselves ask for plugins
+        loaded = _found[group] = {}  # already there for plugins that themselves ask for plugins
         problems: list[str] = []
         for entry in entry_points(group, problems):
             try:
-                found[entry.name] = _load(entry, group, found)
+                loaded[entry.name] = _load(entry, group, loaded)
             except KeyboardInterrupt:
                 del _found[group]  # next time from the start
                 raise
@@ -53,10 +53,10 @@ def forget_plugins() -> None:
     _found.clear()
 
 
-def _load(entry: EntryPoint, group: str, found: dict[str, Any]) -> Any:
+def _load(entry: EntryPoint, group: str, loaded: dict[str, Any]) -> Any:
     """What an entry point names; _Unfit, or whatever its code raises, if it cannot be used."""
     builtin: Any = BUILTIN if group == FILTER_GROUP else PIPELINES
-    if entry.name in builtin or entry.name in found:
+    if entry.name in builtin or entry.name in loaded:
         owner = "the built-in one" if entry.name in builtin else "one of another plugin"
         raise _Unfit(f"the name is that of {owner}")
     with redirect_stdout(sys.stderr):  # where there are results of commands, nothing else may be
@@ -85,6 +85,6 @@ def _check_filter(name: str, cls: Any) -> None:
 
 
 def _check_pipeline(name: str, make: Any) -> None:
-    made = make() if callable(make) else make
-    if not callable(make) or not isinstance(made, Pipeline):
-        raise _Unfit(f"it must be a callable that returns a Pipeline, and gives a {type(made).__name__}")
+    pipeline = make() if callable(make) else make
+    if not callable(make) or not isinstance(pipeline, Pipeline):
+        raise _Unfit(f"it must be a callable that returns a Pipeline, and gives a {type(pipeline).__name__}")

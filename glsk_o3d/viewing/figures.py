@@ -88,29 +88,29 @@ def three_views(figure: Any, extent: np.ndarray, *, head: float, foot: float) ->
     _scale_bar(figure, scale, gap, base + ABOVE_VIEWS)
     for row in rows:
         tallest = scale * max(extent[b] for _, b in row)
-        base, left = base - tallest, gap
+        base, x = base - tallest, gap
         for a, b in row:
             size = scale * extent[[a, b]]
-            axes = figure.add_axes([*([left, base + (tallest - size[1]) / 2] / whole), *(size / whole)])
+            axes = figure.add_axes([*([x, base + (tallest - size[1]) / 2] / whole), *(size / whole)])
             axes.set_axis_off()
             axes.set(xlim=extent[a] * np.array([-0.5, 0.5]), ylim=extent[b] * np.array([-0.5, 0.5]))
             yield a, b, axes
-            told = f"{'xyz'[a]}\N{RIGHTWARDS ARROW} {'xyz'[b]}\N{UPWARDS ARROW}"
-            place = [left + size[0] / 2, base - 0.8 * VIEW_NAME] / whole
-            figure.text(*place, told, ha="center", color="#999999", fontsize=7)
-            left += size[0] + gap
+            name = f"{'xyz'[a]}\N{RIGHTWARDS ARROW} {'xyz'[b]}\N{UPWARDS ARROW}"
+            place = [x + size[0] / 2, base - 0.8 * VIEW_NAME] / whole
+            figure.text(*place, name, ha="center", color="#999999", fontsize=7)
+            x += size[0] + gap
         base -= VIEW_NAME
 
 
-def _scale_bar(figure: Any, scale: float, left: float, up: float) -> None:
+def _scale_bar(figure: Any, scale: float, x: float, y: float) -> None:
     """A bar as long as some round number, with the number: of so many inches per unit, and at a place in inches."""
     from matplotlib.lines import Line2D
     from matplotlib.ticker import MaxNLocator
 
     length = MaxNLocator(2, steps=[1, 2, 5, 10]).tick_values(0, LONGEST_BAR / scale)[1]
-    ends, inches = [left, left + scale * length], {"transform": figure.dpi_scale_trans, "color": INK}
-    figure.add_artist(Line2D(ends, [up, up], marker="|", markersize=5, linewidth=0.9, **inches))
-    figure.text(ends[1] + 0.08, up, f"{length:g}", va="center_baseline", fontsize=7, **inches)
+    ends, inches = [x, x + scale * length], {"transform": figure.dpi_scale_trans, "color": INK}
+    figure.add_artist(Line2D(ends, [y, y], marker="|", markersize=5, linewidth=0.9, **inches))
+    figure.text(ends[1] + 0.08, y, f"{length:g}", va="center_baseline", fontsize=7, **inches)
 
 
 def _arrange(extent: np.ndarray, free: np.ndarray) -> tuple[Any, float, np.ndarray]:
@@ -118,12 +118,12 @@ def _arrange(extent: np.ndarray, free: np.ndarray) -> tuple[Any, float, np.ndarr
 
     The size is that of the views, the gaps beside them and the names below.
     """
-    found = []
+    layouts = []
     for rows in _ARRANGEMENTS:
         across = max(sum(extent[a] for a, _ in row) for row in rows)
         up = sum(max(extent[b] for _, b in row) for row in rows)
         beside = np.array([VIEW_GAP * (max(map(len, rows)) + 1), VIEW_NAME * len(rows)])
         scale = min((free - beside) / [across, up])
-        found.append((rows, scale, scale * np.array([across, up]) + beside))
-    best = max(found, key=lambda arrangement: arrangement[1])
-    return best if best[1] > WORTH_A_CHANGE * found[0][1] else found[0]
+        layouts.append((rows, scale, scale * np.array([across, up]) + beside))
+    best = max(layouts, key=lambda layout: layout[1])
+    return best if best[1] > WORTH_A_CHANGE * layouts[0][1] else layouts[0]

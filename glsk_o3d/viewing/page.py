@@ -77,7 +77,7 @@ def _page(skeleton: Skeleton, title: str, facts: Mapping[str, Mapping[str, str]]
     report, kind = skeleton.report, "Curve skeleton" if len(skeleton.vertices) else "Point cloud"
     now = datetime.now(timezone.utc).strftime("%d %B %Y, %H:%M UTC")
     thinning = f"The view shows {len(shown):,} of {finite:,} points, drawn at random."
-    more = [told(heading, rows) for heading, rows in facts.items()]
+    more = [section(heading, rows) for heading, rows in facts.items()]
     below = [*more, contraction(report), topology(report), support(report), origin(report)]
     return markup(
         html,
@@ -137,12 +137,12 @@ def _detail(skeleton: Skeleton, n_lone: int, centre: np.ndarray, unit: float) ->
     """Pieces of pruned branches, and the probabilities by which the view shows all pieces; that from which it does."""
     limbs = all_limbs(skeleton)
     chance = np.ones(len(limbs.vertices))
-    for _, each, path in pruning_order(limbs):
-        chance[path[1:]] = each
+    for _, probability, path in pruning_order(limbs):
+        chance[path[1:]] = probability
     of_edge, of_limb = chance[limbs.edges].min(axis=1), [limb.probability for limb in limbs.judged.values()]
     m, given, now = len(skeleton.vertices), len(skeleton.edges), [limb.changed for limb in limbs.judged.values()]
-    most = max((each for each, pruned in zip(of_limb, now, strict=True) if pruned), default=0.0)
-    least = min((each for each, pruned in zip(of_limb, now, strict=True) if not pruned), default=1.0)
+    most = max((p for p, pruned in zip(of_limb, now, strict=True) if pruned), default=0.0)
+    least = min((p for p, pruned in zip(of_limb, now, strict=True) if not pruned), default=1.0)
     spheres = np.column_stack([(limbs.vertices - centre) / unit, np.nan_to_num(limbs.radii / unit)])
     return {
         "pruned": _packed(spheres[limbs.edges[given:]], "<f4"),
@@ -210,7 +210,7 @@ def support(report: Report) -> Markup:
     return markup("<h2>Support</h2><p>{}</p>{}", share, _table(("part", "here", "samples"), rows, "support"))
 
 
-def told(heading: str, rows: Mapping[str, str]) -> Markup:
+def section(heading: str, rows: Mapping[str, str]) -> Markup:
     """A section of names and texts."""
     return markup("<h2>{}</h2>{}", heading, _table((), list(rows.items()), "support"))
 
@@ -226,10 +226,10 @@ def _table(heads: Iterable[str], rows: Sequence[Sequence[str]], kind: str = "", 
     """A table of texts, nothing without rows; `marks` are attributes of the rows."""
     if not rows:
         return Markup()
-    head = [markup("<th>{}</th>", each) for each in heads]
+    header = [markup("<th>{}</th>", head) for head in heads]
     body = [
         markup("<tr{}>{}</tr>", mark, [markup("<td>{}</td>", cell) for cell in row])
         for mark, row in zip_longest(marks, rows, fillvalue="")
     ]
     table = '<div class="wide {}"><table><thead><tr>{}</tr></thead><tbody>{}</tbody></table></div>'
-    return markup(table, kind, head, body)
+    return markup(table, kind, header, body)

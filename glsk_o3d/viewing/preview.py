@@ -86,14 +86,14 @@ def draw(
         raise InvalidParameterError(f"marked: {len(points)} points need as many values, not {np.shape(marked)}")
     shown = figures.thinned(points, figures.MOST_DRAWN_POINTS)
     cloud, amber = points[shown], np.zeros(len(shown), bool) if marked is None else np.asarray(marked, bool)[shown]
-    vertices = [each.vertices for each in (skeleton, beside) if each is not None]
+    vertices = [curve.vertices for curve in (skeleton, beside) if curve is not None]
     centre, extent = figures.room(np.concatenate([cloud, *vertices]))
     head, foot, report = 0.58 if title else 0.25, 0.34, skeleton.report
     room = _LINE_HEIGHT * (_MOST_LINES * _MOST_WARNINGS + 1) if report.warnings else 0
     figure = figures.new_figure(figures.fitting_size(extent, head=head, foot=foot + room))
     width, height = figure.get_size_inches()
-    told = (f"{name}_{value}" for name, value in counts(skeleton).items())
-    counted = [line.replace("_", " ") for line in _wrapped("   ".join(told), width)]
+    pairs = (f"{name}_{value}" for name, value in counts(skeleton).items())
+    counted = [line.replace("_", " ") for line in _wrapped("   ".join(pairs), width)]
     warned = [line for text in report.warnings[:_MOST_WARNINGS] for line in _wrapped(f"warning: {text}", width)]
     if (more := len(report.warnings) - _MOST_WARNINGS) > 0:
         warned.append(f"and {more} more warning{'s' * (more > 1)}")

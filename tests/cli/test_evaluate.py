@@ -61,16 +61,11 @@ def test_with_a_truth(invoke, scans, ring, moved):
 
 
 @pytest.mark.usefixtures("moved")
-def test_a_vertex_against_a_vertex(invoke, scans):
+def test_a_vertex_is_compared_alone_and_a_cloud_elsewhere_is_doubted(invoke, scans, tmp_path, write_scan, ring):
     words = ("evaluate", "dot.ply", scans / "ring.ply", "--truth", "ball.npz")
-    told = json.loads(invoke(*words, "--json").stdout)
-    assert told["assessment"] is None
-    assert told["comparison"]["components"] == 0
+    facts = json.loads(invoke(*words, "--json").stdout)
+    assert (facts["assessment"], facts["comparison"]["components"]) == (None, 0)
     assert "centredness" not in invoke(*words).stdout
-
-
-@pytest.mark.usefixtures("moved")
-def test_a_cloud_elsewhere_or_in_other_units(invoke, tmp_path, write_scan, ring):
     for points in (ring.points + [9, 0, 0], 1000 * ring.points, ring.points / 1000):
         result = invoke("evaluate", "s.json", write_scan(tmp_path / "c.ply", points))
         assert result.exit_code == 0

@@ -14,50 +14,26 @@ from glsk_o3d.pipelines import PIPELINES
 from glsk_o3d.recipes.catalogue import catalogue
 
 
-@pytest.fixture
-def squeezed(invoke, monkeypatch):
-    """Output with all white space made one."""
+def test_every_parameter_and_every_pipeline_is_listed(invoke, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
-    return lambda *words: " ".join(invoke("filters", *words).stdout.split())
-
-
-def test_every_parameter_and_every_pipeline_is_listed(squeezed, invoke):
-    whole = squeezed()
-    assert max(map(len, invoke("filters").stdout.splitlines())) <= 80
-    for name, cls in catalogue().items():
-        one = squeezed(name)
-        for field in dataclasses.fields(cls):
-            facts = field.metadata
-            default = "none" if field.default is None else field.default
-            for text in (whole, one):
-                assert f"{field.name} {facts['doc']}" in text
-                assert f"default {default}" in text
-            unit = [f"[{facts['unit']}]"] if facts["unit"] != "-" else []
-            low = [] if facts["low"] is None else [f"{'above' if facts['open_low'] else 'at least'} {facts['low']:g}"]
-            high = [] if facts["high"] is None else [f"at most {facts['high']:g}"]
-            assert all(words in one for words in [*facts["choices"], *unit, *low, *high])
-    for name, make in PIPELINES.items():
-        one = squeezed(name)
-        assert repr(make()) in whole
-        assert repr(make()) in one
-        assert "RingSizeRatio stopping rule" not in one
-
-
-def test_json_has_every_field(invoke):
-    told = json.loads(invoke("filters", "--json").stdout)
-    assert [each["name"] for each in told["filters"]] == list(catalogue())
-    for each in told["filters"]:
+    text = invoke("filters").stdout
+    assert max(map(len, text.splitlines())) <= 80
+    text, facts = " ".join(text.split()), json.loads(invoke("filters", "--json").stdout)
+    assert [each["name"] for each in facts["filters"]] == list(catalogue())
+    for each in facts["filters"]:
         cls = catalogue()[each["name"]]
+        alone = " ".join(invoke("filters", cls.__name__).stdout.split())
         assert each["kind"] == ("filter" if issubclass(cls, Filter) else "stopping rule")
         for parameter, field in zip(each["parameters"], dataclasses.fields(cls), strict=True):
-            plain = field.default if not dataclasses.is_dataclass(field.default) else repr(field.default)
-            assert [parameter[key] for key in ("name", "type", "default")] == [
-                field.name,
-                field.metadata["type"],
-                plain,
-            ]
-    expressions = {each["name"]: each["expression"] for each in told["pipelines"]}
+            plain = repr(field.default) if dataclasses.is_dataclass(field.default) else field.default
+            assert (parameter["name"], parameter["default"]) == (field.name, plain)
+            assert all(parameter[key] == value for key, value in field.metadata.items() if key != "choices")
+            for words in (f"{field.name} {field.metadata['doc']}", f"default {'none' if plain is None else plain}"):
+                assert words in text
+                assert words in alone
+    expressions = {each["name"]: each["expression"] for each in facts["pipelines"]}
     assert expressions == {name: repr(make()) for name, make in PIPELINES.items()}
+    assert all(expression in text for expression in expressions.values())
 
 
 def test_what_a_plugin_prints_is_no_result(install, capfd):
@@ -93,12 +69,11 @@ def test_what_is_installed_is_a_command(glsk):
     assert {"make", "run", "score", "table"} <= set(shown.stdout.split())
 
 
-@pytest.mark.parametrize("more", [[], ["make", "bench", "--jobs", "2"], ["--help"]])
+@pytest.mark.parametrize("more", [["make", "bench", "--jobs", "2"], ["--help"]])
 def test_what_is_not_says_how_to_get_it(glsk, more):
     absent = glsk("benchmark", *more, entries={})
     assert (absent.exit_code, absent.stdout) == (1, "")
-    cure = "pip install ./benchmarks in a clone of glsk-o3d"  # it is not on PyPI
-    assert absent.stderr == f"glsk: error: glsk benchmark needs another distribution: {cure}\n"
+    assert "needs another distribution: pip install ./benchmarks" in absent.stderr  # it is not on PyPI
 
 
 @pytest.mark.parametrize("value", ["no_such_module:app", "json:__name__"])

@@ -1,8 +1,6 @@
 """`glsk info` and `glsk view`: what is in a file."""
 
 import json
-import re
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -40,6 +38,9 @@ def test_numbers_of_a_cloud(told, tmp_path, write_scan):
     assert (facts["lowest"], facts["highest"]) == ([0, 0, 0], [2, 2, 0])
     assert facts["diagonal"] == pytest.approx(np.sqrt(8))
     assert (facts["colours"], facts["normals"]) == (False, False)
+    (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    facts = told("m.obj")
+    assert (facts["kind"], facts["points"], facts["triangles"]) == ("cloud", 3, 1)
     write_scan(tmp_path / "bad.ply", np.full((3, 3), np.nan))
     facts = told("bad.ply")
     assert (facts["not_finite"], facts["diagonal"], facts["median_spacing"]) == (3, None, None)
@@ -66,20 +67,10 @@ def test_skeletons_of_every_format_and_the_report_of_the_run(told, skeleton, inv
     assert facts["stop_reason"] == report.stop_reason
     assert facts["stages"] == list(report.stages)
     assert [each["n_points"] for each in facts["iterations"]] == [each.n_points for each in report.iterations]
-    table = invoke("info", "s.npz").stdout
-    assert re.search(r"^radii +[\d.]+ [\d.]+$", table, re.MULTILINE)
-    assert re.search(r"^stages +Sampler OutlierRemover", table, re.MULTILINE)
-    assert all(f"{each.explained:.4f}" in table for each in report.iterations)
+    assert all(f"{each.explained:.4f}" in invoke("info", "s.npz").stdout for each in report.iterations)
     call = Decision("gap", (1.0, 2.0, 3.0), 0.45, changed=False)
     save_skeleton(replace(skeleton["s.json"], report=replace(report, decisions=(call,))), tmp_path / "close.json")
     assert told("close.json")["uncertain"] == [str(call)]
-
-
-def test_a_mesh_is_a_cloud(told, invoke, tmp_path):
-    (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    facts = told("m.obj")
-    assert (facts["kind"], facts["points"], facts["triangles"]) == ("cloud", 3, 1)
-    assert invoke("info", "m.obj", "-q").output == ""
 
 
 def test_coordinates_of_a_map_keep_their_digits(invoke, told, tmp_path):
@@ -129,16 +120,6 @@ def shown(monkeypatch):
     return calls
 
 
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="about X11")
-def test_without_a_display_it_names_what_else_there_is(glsk, monkeypatch, y):
-    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    monkeypatch.setenv("DISPLAY", ":4242")
-    run = glsk("view", y)
-    assert run.returncode == 1
-    assert run.stderr.startswith("glsk: error: there is no display to open a window on: save_report and save_pre")
-    assert run.stderr.count("\n") == 1
-
-
 def test_a_window_shows_a_skeleton_or_a_scan(invoke, scans, tmp_path, y, shown):
     for file in (y, scans / "sample.ply"):
         assert invoke("view", file).exit_code == 0
@@ -156,10 +137,3 @@ def test_files_instead_of_a_window(invoke, scans, shown, tmp_path, y):
         assert f"<title>{file.name}</title>" in (tmp_path / "r.html").read_text("utf-8")
         assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
     assert shown == []
-
-
-def test_an_unknown_ending_names_those_of_clouds_and_skeletons(refused, tmp_path):
-    (tmp_path / "cloud.npy").write_bytes(b"")
-    message = refused(1, "info", "cloud.npy")
-    assert message.startswith("cloud.npy: unknown ending; known are .")
-    assert {".xyz", ".ply", ".las", ".swc"} <= set(message.replace(",", "").split())

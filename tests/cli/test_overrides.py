@@ -1,18 +1,15 @@
 """`--set Filter.parameter=value`: parsing, placing, refusing."""
 
-import dataclasses
 from contextlib import suppress
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import glsk_o3d
 from glsk_o3d import Contractor, InvalidParameterError, LPRReducer, Pipeline, RingBuilder, RingSizeRatio
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.pipeline import parts
-from glsk_o3d.pipelines import PIPELINES, cao2010, default
-from glsk_o3d.recipes.catalogue import catalogue
+from glsk_o3d.pipelines import default
 
 
 def find(pipeline, name):
@@ -24,6 +21,7 @@ def find(pipeline, name):
     ("setting", "name", "value"),
     [
         ("RingBuilder.k=16", "k", 16),
+        ("Refiner.limb=0", "limb", 0.0),
         (" RingBuilder . k = auto ", "k", "auto"),
         ("RingBuilder.radius=none", "radius", None),
         ("Connector.radius=2.5%", "radius", "2.5%"),
@@ -44,23 +42,6 @@ def test_values_of_every_kind(setting, name, value):
     assert (got, type(got)) == (value, type(value))
     before = getattr(find(default(), owner), name)
     assert changed.with_options({f"{owner}.{name}": before}) == default()  # nothing else has changed
-
-
-def test_round_trip_of_every_pipeline():
-    for make in PIPELINES.values():
-        pipeline = make()
-        settings = [
-            f"{type(part).__name__}.{f.name}={value}"
-            for part in parts(pipeline)
-            for f in dataclasses.fields(part)
-            if not dataclasses.is_dataclass(value := getattr(part, f.name))
-        ]
-        start = default() if find(pipeline, "Contractor").reducer else cao2010()
-        kinds = {type(stage) for stage in pipeline.stages}
-        start = Pipeline(*(stage for stage in start.stages if type(stage) in kinds))
-        assert override(start, settings) == pipeline
-        names = vars(glsk_o3d) | {name: getattr(glsk_o3d, name) for name in catalogue()}
-        assert eval(repr(pipeline), names) == pipeline
 
 
 def test_where_settings_go():
@@ -88,15 +69,12 @@ def test_where_settings_go():
         ("radius=2%", "--set radius=2%: radius: more than one part of the pipeline has it"),
         ("max_iteration=2", "did you mean 'max_iterations'?"),
         ("connector.radius=2%", "connector is not in the pipeline, which has Sampler, OutlierRemover, "),
-        ("RingBuilder.consumes=cloud", "no parameter of RingBuilder is called 'consumes'"),
         ("Contractor.stop=RingSizeRati", "no stop is called 'RingSizeRati': did you mean 'RingSizeRatio'?"),
         ("Contractor.stop=LPRReducer", "no stop is called 'LPRReducer'"),
         ("Contractor.reducer=Contractor", "no reducer is called 'Contractor'"),
-        ("Contractor.stop=none", "no stop is called 'none'"),
         ("RingBuilder.k=many", "RingBuilder.k = 'many': must be an int, or 'auto', or 'published'"),
         ("LPRReducer.phi=nan", "LPRReducer.phi = nan: must be finite"),
         ("LPRReducer.conserve_mass=maybe", "LPRReducer.conserve_mass = 'maybe': must be True or False"),
-        ("Connector.radius=101%", "a percentage of the diagonal: above 0% and up to 100%"),
     ],
 )
 def test_refuses(setting, message):

@@ -82,17 +82,12 @@ def test_the_list_says_what_each_script_does(invoke):
     assert all(len(each["doc"]) > 40 for each in told.values())
 
 
-def test_measures_are_plain_and_a_mesh_can_be_written_as_points(invoke, script, tmp_path):
+def test_measures_are_plain(invoke, script, tmp_path):
     mesh = o3d.geometry.TriangleMesh.create_torus(radial_resolution=40)
     assert o3d.io.write_triangle_mesh(str(tmp_path / "m.ply"), mesh)
-    name = script("Compute Geometric Measures")
-    (step,) = json.loads(invoke("run", name, "m.ply", "--json").stdout)["steps"]
+    (step,) = json.loads(invoke("run", script("Compute Geometric Measures"), "m.ply", "--json").stdout)["steps"]
     assert np.shape(step["result"]["inertia_tensor"]) == (3, 3)
     assert step["result"]["bbox"]["max"] == pytest.approx([1.5, 1.5, 0.5])
-    assert "bbox min -1.5 -1.5 -0.5, max 1.5 1.5 0.5, diagonal 4.3589, " in invoke("run", name, "m.ply").stdout
-    assert invoke("run", "scan_cleanup", "m.ply", "-o", "c.xyz").exit_code == 0
-    n_vertices = len(mesh.vertices)
-    assert n_vertices / 2 < len(read_cloud(tmp_path / "c.xyz").points) <= n_vertices
 
 
 def test_points_that_are_not_finite_and_loops(invoke, refused, scans, script, tmp_path):

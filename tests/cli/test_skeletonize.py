@@ -9,16 +9,20 @@ import numpy as np
 import pytest
 
 import glsk_o3d
-from glsk_o3d import annotate, read_skeleton, read_tensor_cloud, samples, to_tubes
+from glsk_o3d import annotate, load_recipe, read_skeleton, read_tensor_cloud, samples, save_recipe, to_recipe, to_tubes
 from glsk_o3d.io import streaming
 from glsk_o3d.io.scans import read_blocks, read_mesh
 
 
-def test_points_that_are_dropped(invoke, scans, tmp_path):
-    run = invoke("skeletonize", scans / "nan.ply", "-o", "s.npz", "--drop-invalid", "--json")
-    facts = json.loads(run.stdout)
+def test_settings_reach_the_run_and_points_are_dropped(invoke, scans, tmp_path):
+    settings = ("--set", "stop=RingSizeRatio", "--set", "Connector.radius=5%", "--set", "max_iterations=1")
+    result = invoke("skeletonize", scans / "nan.ply", "-o", "s.npz", "--drop-invalid", *settings, "--json")
+    facts, skeleton = json.loads(result.stdout), read_skeleton(tmp_path / "s.npz")
     assert (facts["points"], facts["dropped"], facts["files"]) == (1000, 2, ["s.npz"])
-    assert (read_skeleton(tmp_path / "s.npz").vertex_of_point < 0).nonzero()[0].tolist() == [3, 8]
+    assert (facts["converged"], facts["stop_reason"]) == (False, "reached max_iterations = 1")
+    assert (skeleton.vertex_of_point < 0).nonzero()[0].tolist() == [3, 8]
+    assert any("stop=RingSizeRatio(" in stage for stage in skeleton.report.stages)
+    assert any("Connector(radius='5%'" in stage for stage in skeleton.report.stages)
 
 
 def test_meshes_are_sampled(invoke, tmp_path):
@@ -66,16 +70,6 @@ def test_a_report(invoke, write_scan, tmp_path):
     assert len(re.findall(r"<tr><td>\d+</td><td>[\d,]+</td>", text)) == solves > 0
 
 
-def test_settings_reach_the_run_and_how_it_ended_is_a_line(invoke, scans, tmp_path):
-    settings = ("--set", "stop=RingSizeRatio", "--set", "Connector.radius=5%", "--set", "max_iterations=1")
-    result = invoke("skeletonize", scans / "sample.ply", "-o", "s.json", *settings)
-    assert "contraction  not converged after 1 solve: reached max_iterations = 1\n" in result.stdout
-    assert not re.search(r"^(iterations|stop reason|converged|sampled) ", result.stdout, re.MULTILINE)
-    stages = read_skeleton(tmp_path / "s.json").report.stages
-    assert any("stop=RingSizeRatio(" in stage for stage in stages)
-    assert any("Connector(radius='5%'" in stage for stage in stages)
-
-
 def test_warnings_json_and_quiet(invoke, scans, tmp_path):
     words = ("skeletonize", scans / "ball.ply", "-o", "s.ply")
     result = invoke(*words, "--json")
@@ -106,6 +100,46 @@ def test_verbose_shows_each_iteration_the_log_and_where_an_error_comes_from(invo
     assert (log.level, log.handlers) == (level, [])
 
 
+# ------------------------------------------------------------------------------------------------ results as recipes
+
+
+@pytest.fixture
+def made(invoke, scans, tmp_path):
+    """A result, beside the recipe of its run."""
+    words = ("--set", "Connector.radius=4%", "--drop-invalid")
+    result = invoke("skeletonize", scans / "nan.ply", "-o", "s.json", *words)
+    assert result.exit_code == 0, result.output
+    save_recipe(load_recipe(tmp_path / "s.json"), tmp_path / "r.json")
+    return read_skeleton(tmp_path / "s.json")
+
+
+@pytest.mark.parametrize("recipe", ["r.json", "s.json"])
+def test_a_run_is_repeated_by_its_recipe_or_that_in_its_result(invoke, scans, tmp_path, made, recipe):
+    words = ("skeletonize", scans / "nan.ply", "--pipeline", recipe, "-o", "again.json")
+    assert json.loads(invoke(*words, "--json").stdout)["files"] == ["again.json"]
+    again = read_skeleton(tmp_path / "again.json")
+    for name in ("vertices", "edges", "radii", "points", "vertex_of_point"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(made, name))
+    assert again.report.recipe == made.report.recipe == to_recipe(load_recipe(tmp_path / "r.json"))
+    assert invoke(*words, "--set", "Connector.radius=5%").exit_code == 0
+    assert read_skeleton(tmp_path / "again.json").report.stages[6].startswith("Connector(radius='5%'")
+
+
+def test_refused_before_anything_runs(refused, scans, tmp_path, made, no_run):
+    data = json.loads((tmp_path / "s.json").read_text())
+    data["report"]["recipe"]["pipeline"] = [{"filter": "Slab"}]
+    (tmp_path / "gone.json").write_text(json.dumps(data))
+    recipe = {"glsk_o3d": {"version": 1}, "pipeline": [{"filter": "RingBuilder", "k": 9}]}
+    (tmp_path / "part.json").write_text(json.dumps(recipe))
+    for code, words, message in (
+        (1, "--pipeline gone.json -o a.ply", "gone.json: pipeline[0].filter: no filter is"),
+        (2, "--pipeline s.json -o ./s.json", "is an input"),
+        (1, "--pipeline none.json -o a.ply", "none.json: no such file"),
+        (2, "--pipeline part.json -o a.ply", "not lead from a cloud to a skeleton"),
+    ):
+        assert message in refused(code, "skeletonize", scans / "sample.ply", *words.split())
+
+
 # --------------------------------------------------------------------------------------------------- labels and tubes
 
 MAP = np.array([471234.5, 5612345.25, 123.0])
@@ -129,11 +163,14 @@ def las(tmp_path):
     return "ring.las"
 
 
-def test_a_scan_with_labels_has_all_that_it_had(invoke, las, tmp_path):
-    result = invoke("skeletonize", las, "--where", "classification == 5", "--labelled", "l.ply", "-o", "s.npz")
+def test_a_scan_with_labels_has_all_that_it_had_and_tubes_are_those_of_the_skeleton(invoke, las, tmp_path):
+    words = ("skeletonize", las, "--where", "classification == 5", "--labelled", "l.ply", "--tubes", "t.ply")
+    result = invoke(*words, "-o", "s.npz")
     assert (result.exit_code, result.stderr) == (0, "")
     scan = read_tensor_cloud(tmp_path / las, where="classification == 5")
-    skeleton = read_skeleton(tmp_path / "s.npz")
+    skeleton, tubes = read_skeleton(tmp_path / "s.npz"), read_mesh(tmp_path / "t.ply")
+    np.testing.assert_array_equal(np.asarray(tubes.vertices), np.asarray(to_tubes(skeleton).vertices))
+    assert tubes.has_vertex_colors()
     back = read_tensor_cloud(tmp_path / "l.ply").point
     assert len(skeleton.points) == 1000
     for name in ("positions", "classification", "intensity", "treeID"):
@@ -142,14 +179,6 @@ def test_a_scan_with_labels_has_all_that_it_had(invoke, las, tmp_path):
     expected = annotate(skeleton, color="branch").point
     for name in ("skeleton_vertex", "branch", "order", "radius", "confidence", "colors"):
         np.testing.assert_array_equal(back[name].numpy(), expected[name].numpy(), err_msg=name)
-
-
-def test_tubes_are_those_of_the_skeleton(invoke, las, tmp_path):
-    words = ("skeletonize", las, "--where", "z > 122", "-o", "s.npz")
-    assert invoke(*words, "--tubes", "t.ply").exit_code == 0
-    tubes, skeleton = read_mesh(tmp_path / "t.ply"), read_skeleton(tmp_path / "s.npz")
-    np.testing.assert_array_equal(np.asarray(tubes.vertices), np.asarray(to_tubes(skeleton).vertices))
-    assert tubes.has_vertex_colors()
 
 
 def test_a_large_scan_is_read_in_blocks(invoke, tmp_path, write_scan, monkeypatch):

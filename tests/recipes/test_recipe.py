@@ -81,9 +81,8 @@ def test_every_parameter_of_every_filter_survives(made):
         assert repr(again) == repr(pipeline)  # 3 is not 3.0
 
 
-@pytest.mark.parametrize("ending", ["json", "JSON"])
-def test_files(tmp_path, ending):
-    path = tmp_path / f"räcipe.{ending}"
+def test_files(tmp_path):
+    path = tmp_path / "räcipe.JSON"
     for make in pipelines.PIPELINES.values():
         save_recipe(make(), path)
         assert load_recipe(path) == load_recipe(str(path)) == make()
@@ -97,16 +96,9 @@ def test_what_a_recipe_looks_like():
     builder, contractor, connector = recipe["pipeline"]
     assert builder == {"filter": "RingBuilder", **vars(RingBuilder(k=20)), "radius": "none"}
     assert contractor["reducer"] == "none"
+    assert from_recipe(one("Contractor", reducer=None)) == from_recipe(one("Contractor", reducer="none"))
     assert contractor["stop"] == {"rule": "RingSizeRatio", "threshold": 0.5}
     assert connector["radius"] == "3%"
-
-
-def test_what_is_left_out_has_its_default():
-    recipe = one("Contractor", reducer={"filter": "LPRReducer", "phi": 2}, max_iterations=3)
-    assert from_recipe(recipe) == Pipeline(Contractor(reducer=LPRReducer(phi=2), max_iterations=3))
-    for nothing in (None, "none"):
-        recipe["pipeline"][0]["reducer"] = nothing
-        assert from_recipe(recipe).stages[0].reducer is None
 
 
 # ---- refused
@@ -171,16 +163,11 @@ def test_wrong_recipes(tmp_path, place, words, recipe):
 )
 def test_files_that_are_no_recipes(tmp_path, name, content, words):
     path = tmp_path / name
+    with pytest.raises((FileNotFoundError, RecipeError)):
+        load_recipe(path)
     path.write_bytes(content)
     with pytest.raises(RecipeError, match=f"^{re.escape(str(path))}: .*{words}"):
         load_recipe(path)
-
-
-def test_files_that_are_not_there(tmp_path):
-    with pytest.raises(FileNotFoundError):
-        load_recipe(tmp_path / "none.json")
-    with pytest.raises(RecipeError, match=r"none.*\.json"):
-        skeletonize(POINTS, tmp_path / "none")  # a path is never a name
 
 
 def thin(state):
@@ -246,28 +233,27 @@ def test_the_documentation(root):
 # ---- what a report holds
 
 
-def repeated(skeleton, cloud):
-    return from_recipe(skeleton.report.recipe)(cloud)
-
-
-@pytest.mark.parametrize(
-    ("name", "ending"), [("default", "json"), ("tree", "npz"), ("wen2024", "json"), ("cao2010", "npz")]
-)
+@pytest.mark.parametrize(("name", "ending"), [("default", "json"), ("tree", "npz")])
 def test_results_repeat_to_the_last_bit(tmp_path, name, ending):
     points = POINTS + np.array([1 / 3, 1e3, 0])
     points[[3, 200]] = [[np.nan, 0, 0], [0, np.inf, 0]]
-    named = pipelines.PIPELINES[name]()
-    pipeline = dataclasses.replace(named.stages[0], drop_invalid=True) | Pipeline(*named.stages[1:])
+    pipeline = pipelines.PIPELINES[name]().with_options(drop_invalid=True)
     skeleton = pipeline(points)
     assert from_recipe(skeleton.report.recipe) == pipeline
     assert skeleton.report.recipe == to_recipe(pipeline)
     save_skeleton(skeleton, tmp_path / f"s.{ending}")
     read = glsk.read_skeleton(tmp_path / f"s.{ending}")
-    assert read.report.recipe == skeleton.report.recipe
-    for again in (repeated(read, read.points), repeated(repeated(skeleton, skeleton.points), points)):
-        for field in ARRAYS:
-            np.testing.assert_array_equal(getattr(again, field), getattr(skeleton, field))
-        assert again.report.recipe == skeleton.report.recipe
+    again = from_recipe(read.report.recipe)(read.points)
+    for field in ARRAYS:
+        np.testing.assert_array_equal(getattr(again, field), getattr(skeleton, field))
+    assert again.report.recipe == read.report.recipe == skeleton.report.recipe
+    if ending == "json":  # a result is a recipe too, but not an old one
+        assert load_recipe(tmp_path / "s.json") == pipeline
+        data = json.loads((tmp_path / "s.json").read_text())
+        del data["report"]["recipe"]
+        (tmp_path / "s.json").write_text(json.dumps(data))
+        with pytest.raises(RecipeError, match=r"s\.json: a recipe is a table such as"):
+            load_recipe(tmp_path / "s.json")
 
 
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
@@ -279,15 +265,3 @@ def test_a_run_that_the_caller_stopped_cannot_be_repeated():
         from_recipe(stopped.report.recipe)
     whole = skeletonize(POINTS, pipeline, on_iteration=lambda record: None)
     assert whole.report.recipe == to_recipe(pipeline)
-
-
-def test_a_result_is_a_recipe_too_but_not_an_old_one(tmp_path):
-    path = tmp_path / "s.json"
-    save_skeleton(skeletonize(POINTS, k=20), path)
-    assert load_recipe(path) == pipelines.default().with_options(k=20)
-    data = json.loads(path.read_text())
-    del data["report"]["recipe"]
-    path.write_text(json.dumps(data))
-    assert glsk.read_skeleton(path).report.stages
-    with pytest.raises(RecipeError, match=r"s\.json: a recipe is a table such as"):
-        load_recipe(path)

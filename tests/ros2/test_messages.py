@@ -52,9 +52,9 @@ MIXED = [("intensity", 0, 2), ("y", 1, 8), ("x", 13, 7), ("z", 19, 8)]
 
 @pytest.mark.parametrize(
     ("fields", "step", "height", "padding", "big"),
-    [(PLAIN, 12, 1, 0, False), (CAMERA, 32, 3, 0, True), (MIXED, 29, 3, 5, False), (MIXED, 29, 3, 5, True)],
+    [(PLAIN, 12, 1, 0, False), (CAMERA, 32, 3, 0, True), (MIXED, 29, 3, 5, False)],
 )
-def test_points_of_any_layout(packed, sent, fields, step, height, padding, big):
+def test_points_of_any_layout(packed, sent, make_message, fields, step, height, padding, big):
     points = np.random.default_rng(1).integers(-999, 999, (12, 3)) / 64  # exact in FLOAT32
     points[4] = np.nan
     points[7, 1] = np.inf
@@ -65,30 +65,23 @@ def test_points_of_any_layout(packed, sent, fields, step, height, padding, big):
     for data in (cloud.data.tobytes(), bytearray(cloud.data)):  # as rclpy and others have it
         np.testing.assert_array_equal(points_of(replace(cloud, data=data)), points)
     assert points_of(packed(np.empty((0, 3)), PLAIN, 12)).shape == (0, 3)
+    back = sent(cloud_of(points, cloud.header, make_message), CLOUD)
+    np.testing.assert_array_equal(points_of(back), points)
+    assert (back.width, back.height, back.is_dense, back.header) == (12, 1, False, cloud.header)
 
 
 @pytest.mark.parametrize(
     ("fields", "changes", "message"),
     [
         ([("x", 0, 7), ("y", 4, 7)], {}, "no field z: its fields are x, y"),
-        ([], {}, "no field x: its fields are none"),
         ([("x", 0, 7), ("y", 4, 5), ("z", 8, 7)], {}, r"y has the datatype 5: it must be FLOAT32 \(7\) or FLOAT64"),
         (PLAIN, dict(width=9), "sizes do not fit .*: 2 x 9 points, point_step 12, row_step 24, 48 bytes"),
         (PLAIN, dict(row_step=12), "rows overlap"),
-        (PLAIN, dict(data=np.zeros(3, np.uint8)), "sizes do not fit .* 3 bytes"),
     ],
 )
 def test_clouds_that_cannot_be_read_say_why(packed, fields, changes, message):
     with pytest.raises(InvalidCloudError, match=message):
         points_of(packed(np.zeros((4, 3)), fields, 12, height=2, **changes))
-
-
-def test_points_there_and_back(make_message, header, sent):
-    points = np.random.default_rng(2).normal(size=(50, 3)).astype(np.float32).astype(float)
-    cloud = sent(cloud_of(points, header, make_message), CLOUD)
-    np.testing.assert_array_equal(points_of(cloud), points)
-    assert (cloud.width, cloud.height, cloud.is_dense, cloud.header) == (50, 1, True, header)
-    assert not cloud_of([[0, 0, math.nan]], header, make_message).is_dense
 
 
 # ------------------------------------------------------------------------------------------------------------- markers

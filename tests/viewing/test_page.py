@@ -5,7 +5,6 @@ import dataclasses
 import json
 import math
 import re
-from html.parser import HTMLParser
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from glsk_o3d import save_report, to_line_set
 from glsk_o3d.analysis import segment
 from glsk_o3d.data.decisions import Decision, Supported
 from glsk_o3d.data.report import IterationRecord, Report
-from glsk_o3d.io.formats import fields
 from glsk_o3d.samples import torus
 from glsk_o3d.viewing import page as sections
 
@@ -57,14 +55,11 @@ def test_positions_come_through(data):
     np.testing.assert_allclose(np.array(colours)[unpacked(held["branch_of_edge"], "<i4")], lines, atol=0.003)
 
 
-def test_large_clouds_are_thinned_and_the_page_says_so(data, tree, tmp_path):
-    n = 25_000
-    points = np.random.default_rng(0).normal(size=(n, 3))
-    many = dataclasses.replace(tree, points=points, normals=None, vertex_of_point=np.arange(n) % 6)
-    held = data(many)
+def test_large_clouds_are_thinned(data, tree, tmp_path):
+    points = np.random.default_rng(0).normal(size=(25_000, 3))
+    held = data(dataclasses.replace(tree, points=points, normals=None, vertex_of_point=np.arange(25_000) % 6))
     assert len(unpacked(held["positions"], "<i2")) == 3 * 20_000
     assert "The view shows 20,000 of 25,000 points" in (tmp_path / "r.html").read_text("utf-8")
-    assert (tmp_path / "r.html").stat().st_size < 1_000_000
 
 
 def test_unknown_radii_and_lone_vertices(data, forest):
@@ -100,91 +95,22 @@ def test_any_skeleton_makes_a_page_that_asks_for_nothing(skeleton, tmp_path):
 HOSTILE = "<meta http-equiv=refresh content='//x'>\"'--><svg/onload=x>&lt;{digest}{0.__class__}%s$x^{\\\\frac$\x1b[2J"
 
 
-class Structure(HTMLParser):
-    """The elements of a page with their attributes, and the text in them; not that of scripts."""
-
-    def __init__(self, page):
-        super().__init__()
-        self.elements, self.text = [], ""
-        self.feed(page)
-
-    def handle_starttag(self, tag, attributes):
-        self.elements.append((tag, attributes))
-
-    def handle_data(self, data):
-        self.text += data if self.elements and self.elements[-1][0] not in ("script", "style") else ""
-
-
-def with_texts(value, text, path=()):
-    """Where a report holds words, or keys that are any, and the same report with other words there."""
-    if isinstance(value, dict):
-        for key, each in value.items():
-            yield from ((place, {**value, key: new}) for place, new in with_texts(each, text, (*path, key)))
-            if path and path[-1] in ("seconds", "versions", "recipe"):
-                yield (*path, f"key {key}"), {**{k: v for k, v in value.items() if k != key}, text: each}
-    elif isinstance(value, list | tuple):
-        for i, each in enumerate(value):
-            for place, new in with_texts(each, text, (*path, i)):
-                yield place, [*value[:i], new, *value[i + 1 :]]
-    elif isinstance(value, str):
-        yield path, text
-
-
 @pytest.mark.parametrize("ending", [".json", ".npz"])
 def test_no_text_of_a_file_becomes_part_of_the_page(tmp_path, tree, ending):
     place = (0.0, 0.0, 0.0)
-    full = dataclasses.replace(
-        judged((0.5, True)),
-        stop_reason="word",
-        stages=("word",),
-        recipe={"glsk_o3d": {"version": 1}, "pipeline": [{"filter": "word", "links": "word"}]},
-        warnings=("word",),
-        n_draws=8,
-        support=(Supported("word", place, present=True, share=0.25),),
-        seconds={"word": 1.0},
-    )
-
-    def page(report, title):
-        values = json.loads(fields.write_json(tree)) | {"report": report}
-        if ending == ".json":
-            (tmp_path / "s.json").write_text(json.dumps(values))
-        else:
-            arrays = {name: getattr(tree, name) for name in fields.ARRAYS}
-            marks = {name: values[name] for name in ("format", "format_version")}
-            np.savez(tmp_path / "s.npz", **arrays, **marks, report=json.dumps(report))
-        save_report(glsk.read_skeleton(tmp_path / f"s{ending}"), tmp_path / "r.html", title=title)
-        return Structure((tmp_path / "r.html").read_text("utf-8"))
-
-    plain = json.loads(json.dumps(full.to_dict()))
-    expected = page(plain, "word").elements
-    shown, refused = set(), set()
-    for place, report in with_texts(plain, HOSTILE):
-        try:
-            made = page(report, HOSTILE)
-        except glsk.FileFormatError:
-            refused.add(place[0])
-            continue
-        assert made.elements == expected or place[0] == "recipe"
-        assert [tag for tag, _ in made.elements] == [tag for tag, _ in expected]
-        if made.text.count("http-equiv=refresh") > 2:  # besides the title and the heading
-            shown.add(place[0])
-    assert refused == {"decisions"}
-    assert shown >= {"stop_reason", "recipe", "warnings", "support", "seconds", "versions"}
+    texts = dict(stop_reason=HOSTILE, stages=(HOSTILE,), warnings=(HOSTILE,), recipe={HOSTILE: HOSTILE})
+    numbers = dict(n_draws=8, support=(Supported(HOSTILE, place, present=True, share=0.25),), seconds={HOSTILE: 1.0})
+    report = dataclasses.replace(judged((0.5, True)), **texts, **numbers, versions={HOSTILE: HOSTILE})
+    glsk.save_skeleton(dataclasses.replace(tree, report=report), tmp_path / f"s{ending}")
+    save_report(glsk.read_skeleton(tmp_path / f"s{ending}"), tmp_path / "r.html", title=HOSTILE)
+    text = (tmp_path / "r.html").read_text("utf-8")
+    assert "<svg" not in text
+    assert "http-equiv=refresh" not in text.replace("&lt;meta http-equiv=refresh", "")
+    assert text.count("&lt;meta http-equiv=refresh") >= 8
+    assert "{0.__class__}" in text
 
 
 # ---------------------------------------------------------------------------------------------------------- sections
-
-
-def test_a_recipe_takes_the_place_of_the_stages(tree):
-    def origin(**more):
-        return sections.origin(dataclasses.replace(tree.report, **more))
-
-    assert "<summary>Recipe</summary>" not in origin()
-    assert "RingBuilder(k=5)" in origin(stages=("RingBuilder(k=5)",))
-    told = origin(stages=("RingBuilder(k=5)",), recipe={"pipeline": [{"filter": "RingBuilder", "k": "<5>"}]})
-    assert "&quot;k&quot;: &quot;&lt;5&gt;&quot;" in told
-    assert "RingBuilder(k=5)" not in told
-    assert ">100 input</td>" in origin(n_input=100)
 
 
 def test_solves_are_rows_and_warnings_are_told_once_each():
@@ -209,11 +135,7 @@ def test_what_changed_and_close_calls_are_listed_the_closest_first():
     places = re.findall(r"the gap at \((\d), 0, 0\)", text)
     assert places == ["3", "2", "0"]
     assert re.findall(r'<tr class="uncertain"><td>(.*?)</td>', text) == ["gap left", "gap bridged"]
-
-
-def test_clear_answers_are_only_counted_and_long_lists_are_cut():
+    long = sections.topology(judged(*[(0.5, True)] * (sections.MOST_LISTED_ROWS + 3)))
+    assert long.count("<td>gap bridged</td>") == sections.MOST_LISTED_ROWS
+    assert "and 3 clearer ones" in long
     assert sections.topology(Report()) == ""
-    assert "<table" not in sections.topology(judged((0.01, False), (0.02, False)))
-    text = sections.topology(judged(*[(0.5, True)] * (sections.MOST_LISTED_ROWS + 3)))
-    assert text.count("<td>gap bridged</td>") == sections.MOST_LISTED_ROWS
-    assert "and 3 clearer ones" in text

@@ -31,15 +31,15 @@ def find_inputs(
     left_out: dict[str, str] = {}
     for given in map(Path, inputs):
         path = Path(os.path.abspath(given))
-        root, found = path.parent, [path]
+        root, files = path.parent, [path]
         if path.is_dir():
-            root, found = path, _clouds(path, out, recursive, left_out)
+            root, files = path, _clouds(path, out, recursive, left_out)
         elif not os.path.lexists(path):
             raise FileNotFoundError(f"{given}: no such file or folder")
         elif path.suffix.lower() == ".txt" and not holds_points(path):
-            found = _listed(given)
-        for each in found:
-            roots.setdefault(each, root)
+            files = _listed(given)
+        for file in files:
+            roots.setdefault(file, root)
     if not roots:
         raise InvalidParameterError("there is no input: give a folder, a list (.txt) or clouds")
     return _named(roots), left_out
@@ -49,7 +49,7 @@ def _clouds(folder: Path, out: Path, recursive: bool, left_out: dict[str, str]) 
     """The files in a folder that may be clouds; of others it is said why not, but not of hidden and written ones."""
     if out == folder:
         raise InvalidParameterError(f"{out}: the clouds are in this folder: give the results one of their own")
-    found = []
+    clouds = []
     for path in folder.rglob("*") if recursive else folder.iterdir():
         hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
         if hidden or not path.is_file() or (out.is_relative_to(folder) and path.is_relative_to(out)):
@@ -59,11 +59,11 @@ def _clouds(folder: Path, out: Path, recursive: bool, left_out: dict[str, str]) 
         elif path.name.lower().endswith(LISTS) and not holds_points(path):
             left_out[str(path)] = "no cloud by its first lines"
         else:
-            found.append(path)
-    if not found:
+            clouds.append(path)
+    if not clouds:
         deeper = "" if recursive else " (sub-folders are taken with recursive)"
         raise FileNotFoundError(f"{folder}: no cloud in it{deeper}; known endings are {', '.join(SCAN_ENDINGS)}")
-    return found
+    return clouds
 
 
 def _listed(path: Path) -> list[Path]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -17,14 +16,15 @@ from ...data.skeleton import Skeleton
 from ...geometry.groups import component_labels
 from ...geometry.paths import maximal_paths
 from ...geometry.vectors import dot, norm
-from .grid import CUT_REACH, Grid, Tile
+from .tiles import CUT_REACH, Grid, Tile
 
 SAMPLE_STEP = 0.25  # fitted: of the scale of a curve, between the places at which others are compared with it
 MOST_SAMPLES = 1000  # derived: places on an edge, where the part has no thickness: a thousandth of it is near enough
 CLAIM_SHARE = 0.5  # fitted: of how far beyond its box a tile counts, up to where a piece must come to be its own
 LONGEST_STUB = 2.0  # fitted: of its scale, up to which what ends at a seam is the foot of a limb that forks beyond it
 
-
+RADIUS, SCALE = 3, 5
+"""Columns of the values of `Strands`."""
 MADE, BORDER, INNER = 0, 1, 2
 """Columns of marks: vertices put where an edge crosses a plane, cut ends at the border of what counts, and cut ends
 where the curve goes on in what is there already."""
@@ -108,19 +108,19 @@ class Strands:
 
     def touching(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         """Vertices in a box, or with an edge whose middle is, (n,) bool array."""
-        found = inside(self.values, low, high)
-        found[self.edges[inside(self.middles, low, high)]] = True
-        return found
+        touches = inside(self.values, low, high)
+        touches[self.edges[inside(self.middles, low, high)]] = True
+        return touches
 
     def outward(self) -> np.ndarray:
         """At every cut end at the border the direction in which its curve would go on, (n, 3) float array; else 0."""
         a, b = self.edges.T
         step = self.values[b, :3] - self.values[a, :3]
         step = step / np.maximum(norm(step), np.finfo(float).tiny)[:, None]
-        found = np.zeros((len(self.values), 3))
-        np.add.at(found, b, step)
-        np.add.at(found, a, -step)
-        return found * self.marks[:, [BORDER]]
+        directions = np.zeros((len(self.values), 3))
+        np.add.at(directions, b, step)
+        np.add.at(directions, a, -step)
+        return directions * self.marks[:, [BORDER]]
 
     def mended(self) -> Strands:
         """Without the vertices that were made in vain, in the middle of edges that went on."""
@@ -145,15 +145,12 @@ class Seams(NamedTuple):
         """What is to be beware of, in sentences."""
         messages = []
         if self.unmatched:
-            messages.append(
-                f"{self.unmatched} of {self.joined + self.unmatched} cuts at seams have nothing to meet on the other "
-                "side, and end there: give larger tiles, or more overlap"
-            )
+            cuts = f"{self.unmatched} of {self.joined + self.unmatched} cuts at seams have nothing to meet"
+            messages.append(f"{cuts} on the other side, and end there: give larger tiles, or more overlap")
         if self.thickest > grid.thickest:
-            messages.append(
-                f"at seams there are parts thicker than the overlap of {grid.overlap:g} allows, radius up to "
-                f"{self.thickest:.3g}: give {grid.overlap * self.thickest / grid.thickest:.3g} or more"
-            )
+            parts = f"at seams there are parts thicker than the overlap of {grid.overlap:g} allows"
+            enough = grid.overlap * self.thickest / grid.thickest
+            messages.append(f"{parts}, radius up to {self.thickest:.3g}: give {enough:.3g} or more")
         return messages
 
 
@@ -186,15 +183,15 @@ def join_tiles(skeletons: Mapping[Tile, Skeleton], grid: Grid) -> tuple[Skeleton
     joint = _Joint()
     brought: dict[Tile, Samples] = {}
     for tile in sorted(skeletons):
-        near = [each for each in brought if max(abs(a - b) for a, b in zip(each, tile, strict=True)) <= 1]
+        near = [other for other in brought if max(abs(a - b) for a, b in zip(other, tile, strict=True)) <= 1]
         strands = Strands.of(skeletons[tile]).within(*grid.box(tile, grid.trust))
         # the skeleton of a part within reach of a cut through the points is not to be trusted
-        cut = ~inside(strands.values, *grid.box(tile, grid.overlap), CUT_REACH * strands.values[:, 3])
-        joint.thickest = float(np.nanmax(strands.values[cut, 3], initial=joint.thickest))
+        cut = ~inside(strands.values, *grid.box(tile, grid.overlap), CUT_REACH * strands.values[:, RADIUS])
+        joint.thickest = float(np.nanmax(strands.values[cut, RADIUS], initial=joint.thickest))
         strands = strands.with_pieces(strands.touching(*grid.box(tile, CLAIM_SHARE * grid.trust)))
         theirs = None
         if near:
-            theirs = Samples(*map(np.concatenate, zip(*(brought[each] for each in near), strict=True)))
+            theirs = Samples(*map(np.concatenate, zip(*(brought[other] for other in near), strict=True)))
         if theirs is not None and len(theirs.places):
             strands, met = _not_there(strands, theirs, grid, tile, near)
             joint.met.append(met)
@@ -208,25 +205,23 @@ def _not_there(
     """What others have not brought, and the values of the ends of the object that they have."""
     for axis, value in grid.seams(tile):
         strands = strands.split(axis, value)
-    there = _covered(strands.middles, theirs)
+    known = _covered(strands.middles, theirs)
     ends = (strands.degree == 1) & ~strands.marks[:, BORDER]
-    ends[strands.edges[~there]] = False
-    left = strands.keep(~there, ~_covered(strands.values, theirs), INNER)
+    ends[strands.edges[~known]] = False
+    new = strands.keep(~known, ~_covered(strands.values, theirs), INNER)
     # a stretch of a curve that others saw, too, and elsewhere, is theirs; unless they have nothing there at all
-    middles = left.middles
-    seen = np.any([inside(middles, *grid.box(each, grid.trust), middles[:, 5]) for each in near], axis=0)
-    leaves = np.zeros(len(left.values), bool)
-    leaves[left.edges[~seen]] = True
-    pieces = left.pieces
-    leaves |= ~np.isin(pieces, pieces[left.marks[:, INNER]])
-    return left.with_pieces(leaves).mended(), strands.values[ends]
+    middles, labels = new.middles, new.pieces
+    seen = np.any([inside(middles, *grid.box(other, grid.trust), middles[:, SCALE]) for other in near], axis=0)
+    own = ~np.isin(labels, labels[new.marks[:, INNER]])
+    own[new.edges[~seen]] = True
+    return new.with_pieces(own).mended(), strands.values[ends]
 
 
 def _covered(values: np.ndarray, theirs: Samples) -> np.ndarray:
     """Which places are on curves that are there: no farther from them than either is thick, and not past a cut end."""
     distance, nearest = cKDTree(theirs.places).query(values[:, :3])
     past = dot(values[:, :3] - theirs.places[nearest], theirs.outward[nearest]) > 0
-    return (distance <= np.fmax(values[:, 5], theirs.scale[nearest])) & ~past
+    return (distance <= np.fmax(values[:, SCALE], theirs.scale[nearest])) & ~past
 
 
 class _Joint:
@@ -252,23 +247,23 @@ class _Joint:
             assert theirs is not None
             self._meet({first + at: strands.values[at] for at in np.flatnonzero(inner).tolist()}, theirs)
         places, edges = strands.values[:, :3], strands.edges
-        scale = np.fmax(np.fmin(*strands.values[edges, 5].T), np.finfo(float).tiny)
+        scale = np.fmax(np.fmin(*strands.values[edges, SCALE].T), np.finfo(float).tiny)
         step = np.fmax(SAMPLE_STEP * scale, norm(places[edges[:, 1]] - places[edges[:, 0]]) / MOST_SAMPLES)
         row, part = pieces(places, edges, step) if len(edges) else (np.empty(0, int), np.empty(0))
         between = along(edges, row, part, strands.values) if len(edges) else np.empty((0, 8))
         values = np.concatenate([strands.values, between])
         vertex = np.concatenate([np.arange(len(places)), edges[row, (part > 0.5).astype(int)]])
         outward = np.concatenate([strands.outward(), np.zeros((len(row), 3))])
-        return Samples(values[:, :3], values[:, 5], first + vertex, outward)
+        return Samples(values[:, :3], values[:, SCALE], first + vertex, outward)
 
     def _meet(self, ends: dict[int, np.ndarray], theirs: Samples) -> None:
         """Match cut ends with open ones, the nearest first, one to one; others touch what is nearest."""
         known = set(theirs.vertex.tolist())
         waiting = {at: values for at, values in self._open.items() if at in known}
-        mine, others = (np.array(list(each.values())).reshape(-1, 8) for each in (ends, waiting))
+        mine, others = (np.array(list(points.values())).reshape(-1, 8) for points in (ends, waiting))
         one_of, other_of = list(ends), list(waiting)
         loose = dict(ends)
-        for row, column in matched(mine[:, :3], others[:, :3], mine[:, None, 5] + others[:, 5]):
+        for row, column in matched(mine[:, :3], others[:, :3], mine[:, None, SCALE] + others[:, SCALE]):
             one, other = one_of[row], other_of[column]
             self._merged.append((one, other))
             del loose[one], self._open[other]
@@ -298,7 +293,7 @@ class _Joint:
         met = np.concatenate(self.met)
         if len(met):  # where an end of the object is beside a cut end, another tile saw it: there is nothing to meet
             distance, nearest = cKDTree(met[:, :3]).query(values[ends, :3])
-            ends = ends[distance > values[ends, 5] + met[nearest, 5]]
+            ends = ends[distance > values[ends, SCALE] + met[nearest, SCALE]]
         seams = Seams(len(other) + len(touching) - len(loose), len(ends), self.thickest)
         number, kept, none = np.cumsum(alive) - 1, values[alive], np.empty((0, 3))
         edges = simple_edges(number[edges])
@@ -308,26 +303,17 @@ class _Joint:
 
 def _stubs(values: np.ndarray, edges: np.ndarray, ends: np.ndarray) -> tuple[list[int], np.ndarray]:
     """Vertices of short limbs that end in a cut: on the other side they fork elsewhere; and the other cut ends."""
-    gone: list[int] = []
-    left: list[int] = []
-    around = defaultdict[int, set[int]](set)
-    for a, b in edges.tolist():
-        around[a].add(b)
-        around[b].add(a)
-    for end in ends.tolist():
-        path, length, longest = [end], 0.0, LONGEST_STUB * values[end, 5]
-        onward = around[end]
-        while len(onward) == 1 and length <= longest:
-            (at,) = onward
-            length += float(norm(values[None, at, :3] - values[path[-1], :3])[0])
-            onward = around[at] - {path[-1]}
-            path.append(at)
-        if len(path) > 1 and len(onward) > 1 and length <= longest:
-            gone += path[:-1]
-            around[path[-1]] = onward
-        else:
-            left.append(end)
-    return gone, np.array(left, np.int64)
+    degree = np.bincount(edges.ravel(), minlength=len(values))
+    stubs, others = list[int](), set(ends.tolist())
+    for path, _ in maximal_paths(len(values), edges):
+        path = path if path[0] in others else path[::-1]
+        if path[0] in others and degree[path[-1]] > 2:
+            length = norm(np.diff(values[path, :3], axis=0)).sum()
+            if length <= LONGEST_STUB * values[path[0], SCALE]:
+                stubs += path[:-1]
+                others.remove(path[0])
+                degree[path[-1]] -= 1
+    return stubs, np.array(sorted(others), np.int64)
 
 
 def inside(values: np.ndarray, low: np.ndarray, high: np.ndarray, by: np.ndarray | float = 0.0) -> np.ndarray:

@@ -17,11 +17,10 @@ from ...io.scan import parsed
 from ...io.skeletons import FORMATS
 from ...pipeline import Filter, Pipeline, parts
 from ...recipes import to_recipe
-from .grid import checked_sizes
 from .inputs import find_inputs
 from .ledger import DONE, STARTED, Ledger, file_hash, refuse_ways_out
-from .splitting import PARTS_FILE, PARTS_FOLDER, Cut, divide, known_split
 from .tasks import TILE_ENDING, Task
+from .tiles import PARTS_FILE, PARTS_FOLDER, Cut, checked_sizes, divide, known_split
 
 UP_TO_DATE = "done"
 RECIPE_FILE = "recipe.json"
@@ -48,14 +47,8 @@ class Plan:
         ``"other parameters"``, ``"outputs are gone"``, ``"input changed"``, ``"asked for"`` or, for a scene,
         ``"tiles to do"``.
     ledger : Ledger
-        The ledger in the folder.
     left_out : dict of str to str
         Skipped files in the folders, with the reason.
-
-    Examples
-    --------
-    >>> plan = plan_batch("scans", "skeletons", recursive=True)  # doctest: +SKIP
-    >>> [(task.source, task.why) for task in plan.todo]  # doctest: +SKIP
     """
 
     out_dir: Path
@@ -157,16 +150,16 @@ def plan_batch(
     out = Path(os.path.abspath(out_dir))
     ledger = Ledger(out)
     given = [inputs] if isinstance(inputs, str | os.PathLike) else inputs
-    found, left_out = find_inputs(given, out, recursive=recursive)
+    sources, left_out = find_inputs(given, out, recursive=recursive)
     common: dict[str, Any] = dict(out_dir=str(out), recipe=recipe, cut_loops=cut_loops, where=where)
     tasks = [
         Task(name, str(path), str(path), tuple(name + ending for ending in endings), **common)
-        for path, name in found.items()
+        for path, name in sources.items()
     ]
-    _refuse_to_replace(tasks, ledger, found)  # before scenes are read
+    _refuse_to_replace(tasks, ledger, sources)  # before scenes are read
     if cut is not None:
-        tasks = [each for task in tasks for each in _tiles_of(task, cut, split)]
-        _refuse_to_replace(tasks, ledger, found)
+        tasks = [part for task in tasks for part in _tiles_of(task, cut, split)]
+        _refuse_to_replace(tasks, ledger, sources)
     with ThreadPoolExecutor() as pool:  # a hash takes as long as reading the file
         whys = pool.map(lambda task: "asked for" if force else _why(task, ledger, parameters), tasks)
         reasons = dict(zip((task.name for task in tasks), whys, strict=True))
@@ -191,21 +184,20 @@ def _endings(formats: Sequence[str], preview: bool) -> list[str]:
 
 
 def _cut(pipeline: Pipeline[Any, Any], where: str | None, tiles: Any, overlap: Any) -> Cut | None:
-    """How scenes are to be taken apart, if they are."""
+    """How scenes are to be split, if they are."""
+    if tiles is None and overlap is not None:
+        raise InvalidParameterError(f"overlap = {overlap!r}: needs tiles: give their size, too")
     if tiles is None:
-        if overlap is not None:
-            raise InvalidParameterError(f"overlap = {overlap!r}: needs tiles: give their size, too")
         return None
     stages = list(parts(pipeline))
     if any(getattr(stage, "root", None) is not None for stage in stages):
         raise InvalidParameterError("tiles: the pipeline makes one tree of all in a tile: give one without root")
-    tiles, overlap = checked_sizes(tiles, overlap)
     drop_invalid = any(getattr(stage, "drop_invalid", False) for stage in stages)
-    return Cut(tiles, overlap, where, drop_invalid)
+    return Cut(*checked_sizes(tiles, overlap), where, drop_invalid)
 
 
 def _tiles_of(whole: Task, cut: Cut, split: bool) -> list[Task]:
-    """A task for each tile of a file, and after them one for the whole; one for a file that cannot be taken apart."""
+    """A task for each tile of a file, and after them one for the whole; one for a file that cannot be split."""
     path, folder = Path(whole.path), Path(whole.out_dir, PARTS_FOLDER, whole.name)
     refuse_ways_out(Path(whole.out_dir), [f"{PARTS_FOLDER}/{whole.name}"])
     try:
@@ -213,15 +205,15 @@ def _tiles_of(whole: Task, cut: Cut, split: bool) -> list[Task]:
     except OSError:  # the worker will say what is wrong, as of what is no cloud
         return [whole]
     try:
-        made = known_split(folder, of) or (divide(path, folder, cut, of) if split else None)
+        scene = known_split(folder, of) or (divide(path, folder, cut, of) if split else None)
     except (FileFormatError, InvalidCloudError):
-        made = None
+        scene = None
     except InvalidParameterError as error:
         raise InvalidParameterError(f"{path}: {error}") from None
-    if made is None:
+    if scene is None:
         return [whole]
     tasks = []
-    for label in made.labels:
+    for label in scene.labels:
         name, source = f"{whole.name}{TILES_FOLDER}{label}", f"{path} tile {label}"
         facts: dict[str, Any] = dict(path=str(folder / f"{label}.ply"), outputs=(name + TILE_ENDING,), where=None)
         tasks.append(replace(whole, name=name, source=source, is_tile=True, **facts))
@@ -231,25 +223,21 @@ def _tiles_of(whole: Task, cut: Cut, split: bool) -> list[Task]:
 def _refuse_to_replace(tasks: Sequence[Task], ledger: Ledger, inputs: Container[Path]) -> None:
     """Raise InvalidParameterError where a batch would replace what is not its own, or write elsewhere."""
     out = ledger.path.parent
-    outputs = [RECIPE_FILE, *(each for task in tasks for each in task.outputs)]
+    outputs = [RECIPE_FILE, *(output for task in tasks for output in task.outputs)]
     refuse_ways_out(out, outputs)
-    for each in outputs:
-        if out / each in inputs:
-            raise InvalidParameterError(f"{out / each}: is an input: give the results another folder")
-        if not ledger.path.exists() and os.path.lexists(out / each):
-            raise InvalidParameterError(
-                f"{out / each}: is not the result of a batch, since there is no ledger here: give the results "
-                "another folder, or remove it"
-            )
+    for path in (out / output for output in outputs):
+        if path in inputs:
+            raise InvalidParameterError(f"{path}: is an input: give the results another folder")
+        if not ledger.path.exists() and os.path.lexists(path):
+            foreign = "is not the result of a batch, since there is no ledger here"
+            raise InvalidParameterError(f"{path}: {foreign}: give the results another folder, or remove it")
     others = [row for row in ledger.rows.values() if row["outputs"] and Path(row["input"]) not in inputs]
     owners = {row["name"]: row["input"] for row in others if os.path.exists(row["input"])}
     for task in tasks:
         owner = owners.setdefault(task.name, task.source)
         if owner != task.source:
-            raise InvalidParameterError(
-                f"the results of {owner} and {task.source} would both be called {task.name}: give the folder above "
-                "them, a list, or each an output folder"
-            )
+            both = f"the results of {owner} and {task.source} would both be called {task.name}"
+            raise InvalidParameterError(f"{both}: give the folder above them, a list, or each an output folder")
 
 
 def _why(task: Task, ledger: Ledger, parameters: str) -> str:
@@ -261,7 +249,7 @@ def _why(task: Task, ledger: Ledger, parameters: str) -> str:
         return "interrupted before" if row["status"] == STARTED else "failed before"
     if row.get("parameters") != parameters:
         return "other parameters"
-    if not all(each in row["outputs"] and Path(task.out_dir, each).is_file() for each in task.outputs):
+    if not all(name in row["outputs"] and Path(task.out_dir, name).is_file() for name in task.outputs):
         return "outputs are gone"
     try:
         now = file_hash(task.path)

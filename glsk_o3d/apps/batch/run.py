@@ -114,15 +114,15 @@ def run_batch(
         raise InvalidParameterError("scheduler: the cluster has its own workers: give no number of them")
     check_number("workers", workers, "int?", low=1)
     folder = Path(os.path.abspath(out_dir))
-    new = [each for each in (folder, *folder.parents) if not each.exists()]
+    new = [path for path in (folder, *folder.parents) if not path.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     refuse_ways_out(folder, [LOCK_FILE])
     with locked(folder):
         try:
             plan = plan_batch(inputs, folder, split=True, **options)
         except BaseException:
-            for made in new[-1:]:  # the uppermost
-                shutil.rmtree(made, ignore_errors=True)
+            for uppermost in new[-1:]:
+                shutil.rmtree(uppermost, ignore_errors=True)
             raise
         if on_plan is not None:
             on_plan(plan)
@@ -142,8 +142,8 @@ def run_batch(
             crew.close(at_once=not complete)
     rows = {task.name: plan.ledger.rows[task.name] for task in plan.tasks}
     failed = sum(row["status"] == FAILED for row in rows.values())
-    done = len(plan.todo) - failed
-    return BatchResult(rows, done, plan.skipped, failed, time.perf_counter() - start, plan.ledger.path)
+    seconds = time.perf_counter() - start
+    return BatchResult(rows, len(plan.todo) - failed, plan.skipped, failed, seconds, plan.ledger.path)
 
 
 class _Run:
@@ -168,20 +168,30 @@ class _Run:
 
     def _do(self, tasks: list[Task]) -> None:
         """Have tasks done, and those whose workers died once more, each by itself."""
-        for task in self._round(tasks):
-            for lost in self._round([task]):
+        for task in self._lost_of(tasks):
+            for lost in self._lost_of([task]):
                 self._enter(lost, failure(WORKER_DIED))
 
-    def _round(self, tasks: list[Task]) -> list[Task]:
-        """Have tasks done, side by side; gives those whose workers died."""
+    def _lost_of(self, tasks: list[Task]) -> list[Task]:
+        """Have tasks done, side by side; gives those whose workers died. BatchError where there are none any more."""
         ready, running, lost = deque(tasks), dict[Future[Any], Task](), []
         while running or ready:
             while len(running) < self._workers.capacity() and ready:
                 task = ready.popleft()
                 self._begin(task)
                 running[self._workers.submit(work, task)] = task
-            ended, _ = wait(running, _POLL_SECONDS, FIRST_COMPLETED)
-            lost += self._collect({future: running.pop(future) for future in ended})
+            problem = None
+            for future in wait(running, _POLL_SECONDS, FIRST_COMPLETED).done:
+                task = running.pop(future)
+                error = BatchError(CONNECTION_LOST) if future.cancelled() else future.exception()
+                if isinstance(error, BatchError):
+                    problem = error
+                elif died(error):
+                    lost.append(task)
+                else:
+                    self._enter(task, future.result() if error is None else failure(in_one_line(error)))
+            if problem is not None:
+                raise problem
         return lost
 
     def _begin(self, task: Task) -> None:
@@ -198,29 +208,14 @@ class _Run:
             del self._rows[row["name"]]
         self._add(task, {"status": STARTED, "outputs": list(task.outputs)})
 
-    def _collect(self, ended: dict[Future[Any], Task]) -> list[Task]:
-        """Put what came of tasks into the ledger; BatchError, in the end, where there is nobody to work any more."""
-        gone, lost = None, []
-        for future, task in ended.items():
-            error = BatchError(CONNECTION_LOST) if future.cancelled() else future.exception()
-            if isinstance(error, BatchError):
-                gone = error
-            elif died(error):
-                lost.append(task)
-            else:
-                self._enter(task, future.result() if error is None else failure(in_one_line(error)))
-        if gone is not None:
-            raise gone
-        return lost
-
     def _enter(self, task: Task, row: Row) -> None:
         """Put into the ledger what came of a task."""
         before = self._rows.get(task.name)
         if row["status"] == FAILED and before and before["status"] != STARTED:  # the cloud is away, its results stay
             row = before | {"status": FAILED, "error": row["error"]}
         else:
-            there = [each for each in task.outputs if row["status"] == DONE or Path(task.out_dir, each).is_file()]
-            row["outputs"] = there
+            done = row["status"] == DONE
+            row["outputs"] = [name for name in task.outputs if done or Path(task.out_dir, name).is_file()]
         row = self._add(task, row)
         if self._on_result is not None:
             self._on_result(row)
@@ -232,10 +227,9 @@ class _Run:
 
     def _has_all_tiles(self, task: Task) -> bool:
         """Whether all that a task needs is done; where tiles failed, it has failed, too."""
-        rows = [self._rows[name] for name in task.needs]
-        undone = [row for row in rows if row["status"] != DONE]
+        undone = [self._rows[name] for name in task.needs if self._rows[name]["status"] != DONE]
         if undone:
-            why = f"{len(undone)} of {len(rows)} tiles failed, {undone[0]['name']} since {undone[0]['error']}"
+            why = f"{len(undone)} of {len(task.needs)} tiles failed, {undone[0]['name']} since {undone[0]['error']}"
             self._begin(task)
             self._enter(task, failure(f"{why}: the same batch tries them again"))
         return not undone

@@ -89,30 +89,31 @@ class Skeletonizer:
         if self._count == 1:
             yield from map(self.pipeline, clouds)
             return
-        pool, waiting, taken, problem = self._pool, deque[Future[Skeleton]](), iter(clouds), None
-        try:
-            while True:
-                try:
-                    cloud = next(taken)
+        pool, waiting = self._pool, deque[Future[Skeleton]]()
+
+        def futures() -> Iterator[Future[Skeleton]]:
+            try:
+                for cloud in clouds:
+                    if pool is not self._pool:
+                        raise BatchError(CLOSED)
                     if open3d_class(cloud) != ("PointCloud", True):  # Open3D's others cannot be sent to a process
                         cloud = surface_mesh(cloud)
-                except StopIteration:
-                    break
-                except Exception as error:  # of a cloud, or of what gives them: after what is underway
-                    problem = error
-                    break
-                if pool is not self._pool:
-                    raise BatchError(CLOSED)
-                waiting.append(pool.submit(_skeletonized, self._recipe, cloud))
+                    yield pool.submit(_skeletonized, self._recipe, cloud)
+            except Exception as error:  # of a cloud, or of what gives them: it is raised after what is underway
+                failed = Future[Skeleton]()
+                failed.set_exception(error)
+                yield failed
+
+        try:
+            for future in futures():
+                waiting.append(future)
                 if len(waiting) > self._count:
-                    yield _told(waiting.popleft())
+                    yield _result(waiting.popleft())
             while waiting:
-                yield _told(waiting.popleft())
+                yield _result(waiting.popleft())
         finally:
             for future in waiting:
                 future.cancel()
-        if problem is not None:
-            raise problem
 
 
 def _skeletonized(recipe: dict[str, Any], cloud: Any) -> Skeleton:
@@ -121,7 +122,7 @@ def _skeletonized(recipe: dict[str, Any], cloud: Any) -> Skeleton:
     return skeleton
 
 
-def _told(future: Future[Skeleton]) -> Skeleton:
+def _result(future: Future[Skeleton]) -> Skeleton:
     """What another process has made, with the warnings that nobody heard there."""
     try:
         skeleton = future.result()

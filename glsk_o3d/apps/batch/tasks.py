@@ -25,10 +25,9 @@ from ...io.skeletons import read_skeleton, save_skeleton
 from ...io.streaming import points_for
 from ...recipes import from_recipe
 from ...viewing.preview import save_preview
-from .grid import tile_of
 from .joining import join_tiles
 from .ledger import DONE, FAILED, Row, file_hash
-from .splitting import read_split
+from .tiles import read_split, tile_of
 
 TILE_ENDING = ".npz"  # of the skeletons of tiles: it keeps all to the last bit
 
@@ -109,19 +108,18 @@ def _joined(task: Task, row: Row) -> Skeleton:
     skeleton, seams = join_tiles(skeletons, split.grid)
     row |= {"seams": seams.joined, "unmatched": seams.unmatched}
     report = Report(n_input=split.points, n_dropped=split.dropped)
-    bare = [each.report.n_input for each in skeletons.values() if not len(each.vertices)]
+    bare = [tile.report.n_input for tile in skeletons.values() if not len(tile.vertices)]
+    messages = seams.messages(split.grid)
     if bare:
-        message = f"{len(bare)} of {len(files)} tiles have no skeleton, of {sum(bare)} points: the ledger says why"
-        report = report.with_warning(message)
-    for message in seams.messages(split.grid):
-        report = report.with_warning(message)
-    return replace(skeleton, report=report)
+        why = f"of {sum(bare)} points: the ledger says why"
+        messages.insert(0, f"{len(bare)} of {len(files)} tiles have no skeleton, {why}")
+    return replace(skeleton, report=replace(report, warnings=tuple(messages)))
 
 
 def in_one_line(error: BaseException) -> str:
     """An error in one line, with its name if it is none that users can mend."""
-    known = in_words(error)
-    return known if isinstance(error, GlskError | OSError) else f"{type(error).__name__}: {known}"
+    words = in_words(error)
+    return words if isinstance(error, GlskError | OSError) else f"{type(error).__name__}: {words}"
 
 
 @contextmanager

@@ -71,7 +71,7 @@ class Builtin:
         if kind is bool:
             return {"true": True, "false": False}[text.lower()]
         if kind is np.ndarray:
-            return np.reshape([float(each) for each in text.split(",")], self.default.shape)
+            return np.reshape(list(map(float, text.split(","))), self.default.shape)
         return kind(*map(int, text.split(","))) if kind is pymeshlab.Color else kind(text)
 
 

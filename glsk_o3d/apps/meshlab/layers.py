@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ...analysis.summary import summary
 from ...data.skeleton import Skeleton
 from ...errors import InvalidCloudError, InvalidParameterError
 from ...interop.atomic import check_ending, write_atomically
@@ -30,8 +31,8 @@ class Layer:
     """Vertices with what hangs on them, (N, ...) arrays: MeshLab calls the scalars quality.
 
     Scalars are the radii of a skeleton, or the branches of a segmented cloud. Colours are red, green, blue and alpha
-    from 0 to 1. `skeleton` is what the vertices and edges show, `source` the layer that it was made from, and `told`
-    what the filter said.
+    from 0 to 1. `skeleton` is what the vertices and edges show, `source` the layer that it was made from, and
+    `results` what the filter returns.
     """
 
     vertices: np.ndarray
@@ -43,7 +44,7 @@ class Layer:
     label: str = "cloud"
     skeleton: Skeleton | None = None
     source: Layer | None = None
-    told: Mapping[str, Any] = field(default_factory=dict)
+    results: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def of(cls, data: Any, label: str = "cloud", source: Layer | None = None) -> Layer:
@@ -107,19 +108,17 @@ class Layer:
             raise InvalidCloudError(f"the current layer ({self.label}) {what}")
         return SurfaceMesh(self.vertices, () if self.faces is None else self.faces)  # type: ignore[arg-type]
 
-    def summary(self) -> dict[str, Any]:
+    def facts(self) -> dict[str, Any]:
         """The layer in a few numbers, as MeshLab's filters return them."""
-        found: dict[str, Any] = {"vertices": len(self.vertices), **self.told}
+        facts: dict[str, Any] = {"vertices": len(self.vertices), **self.results}
         skeleton = self.skeleton
         if skeleton is not None:
-            found |= {"edges": len(skeleton.edges), "components": skeleton.n_components, "loops": skeleton.n_loops}
-            found |= {"length": skeleton.length}
-            report = skeleton.report
-            found |= {"iterations": len(report.iterations), "converged": report.converged}
-            found |= {"stop_reason": report.stop_reason, "warnings": list(report.warnings)}
+            run, report = summary(skeleton, 0.0), skeleton.report
+            names = ("edges", "components", "loops", "length", "iterations", "converged", "stop_reason")
+            facts |= {name: run[name] for name in names} | {"warnings": list(report.warnings)}
         elif self.colors is not None and self.scalars is not None:
-            found["branches"] = int(self.scalars.max(initial=-1)) + 1
-        return found
+            facts["branches"] = int(self.scalars.max(initial=-1)) + 1
+        return facts
 
     def to_pymeshlab(self) -> Any:
         """The layer as a ``pymeshlab.Mesh``; MissingPackageError without pymeshlab."""

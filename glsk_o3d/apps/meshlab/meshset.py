@@ -98,7 +98,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[misc, name-defined]
         self.add_mesh(layer.to_pymeshlab(), layer.label)
         self._made = {number: known for number, known in self._made.items() if self.mesh_id_exists(number)}
         self._made[self.current_mesh_id()] = layer
-        return {"layer": self.current_mesh_id(), **layer.summary()}
+        return {"layer": self.current_mesh_id(), **layer.facts()}
 
     def _run_theirs(self, name: str, params: dict[str, Any]) -> dict[str, Any]:
         if self.mesh_number():  # without a mesh it crashes
@@ -106,12 +106,12 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[misc, name-defined]
                 if builtin.is_layer(key, value) and not self.mesh_id_exists(value):
                     raise InvalidParameterError(f"{key} = {value}: there is no such layer")
         super().clear_filter_script()
-        here = os.getcwd()
+        folder = os.getcwd()
         try:
             result: dict[str, Any] = super().apply_filter(name, **params)
             return result
         finally:
-            os.chdir(here)  # when Poisson's fails, it stays in a temporary folder that it has removed
+            os.chdir(folder)  # when Poisson's fails, it stays in a temporary folder that it has removed
 
     def _last_call(self) -> Call:
         """The filter of MeshLab's that ran last as MeshLab writes it, which alone knows how."""
@@ -140,15 +140,15 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[misc, name-defined]
 
     def apply_filter_script(self) -> None:
         """Run the filters of the current script, in order, from the current layer on."""
-        for each in self._script:
-            self.apply_step(each)
+        for recorded in self._script:
+            self.apply_step(recorded)
 
     def save_filter_script(self, filter_script_name: str | os.PathLike[str]) -> None:
         """Write the current script: loaded filters, and those applied since. Our lengths in percent stay percentages.
 
         It does not record the current layer, so name the layer in our filters.
         """
-        write_script(filter_script_name, [each.call for each in self._script])
+        write_script(filter_script_name, [recorded.call for recorded in self._script])
 
     def clear_filter_script(self) -> None:
         """Make the current script empty."""
@@ -156,7 +156,7 @@ class MeshSet(pymeshlab.MeshSet):  # type: ignore[misc, name-defined]
 
     def print_filter_script(self) -> None:
         """Print the current script as it would be saved."""
-        print(script_text([each.call for each in self._script]))
+        print(script_text([recorded.call for recorded in self._script]))
 
     def add_points(self, points: Any, name: str = "cloud") -> None:
         """Add a cloud, anything that `skeletonize` takes, as a new layer, which becomes the current one."""

@@ -122,7 +122,7 @@ def comment(path: str | os.PathLike[str]) -> str:
 
 def scripts() -> dict[str, Path]:
     """The files of the filter scripts that come with the package, by name."""
-    here = Path(__file__)
-    places = (here.parent / "scripts", here.parents[3] / "filters")  # installed, and in a checkout
+    own = Path(__file__)
+    places = (own.parent / "scripts", own.parents[3] / "filters")  # installed, and in a checkout
     folder = next((place for place in places if place.is_dir()), None)
     return {path.stem: path for path in sorted(folder.glob("*.mlx"))} if folder else {}

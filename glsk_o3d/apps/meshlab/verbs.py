@@ -2,7 +2,6 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -14,7 +13,7 @@ from ...errors import InvalidParameterError, did_you_mean
 from ...io.colors import shades
 from ...parameters import Parameters, parameter, problem_with, resolve_length, shown
 from ...pipeline import Pipeline, parts
-from ...recipes.catalogue import catalogue, known_pipelines, named_pipeline, serves
+from ...recipes.catalogue import catalogue, known_pipelines, named_pipeline, serves, value_from_text
 from ..crosscheck import cross_check
 from ..crosscheck.check import MADE_BY
 from .layers import Layer
@@ -42,24 +41,11 @@ class Slot:
         kind: str = self.facts["type"]
         return kind.rstrip("?")
 
-    @property
-    def words(self) -> tuple[str, ...]:
-        """What it may be in words."""
-        words = self.facts["choices"]
-        if self.kind in PARTS:
-            serving = [name for name, cls in catalogue().items() if serves(cls, self.kind)]
-            words = [name for name in serving if name != self.option.partition(".")[0]]
-        return (*words, *["none"] * self.facts["type"].endswith("?"))
-
     def checked(self, value: Any) -> Any:
-        """The value as the filter takes it, reducers and rules made from their names; ValueError if it is wrong."""
+        """The value as the filter takes it, numbers, reducers and rules made from text; ValueError if it is wrong."""
         value = _plain(value)
-        if value == "none" and "none" in self.words:
-            return None
-        if self.kind in PARTS and isinstance(value, str):
-            if value not in self.words:
-                raise ValueError(did_you_mean(value, self.words, self.kind))
-            return catalogue()[value]()
+        if isinstance(value, str):
+            value = value_from_text(value, self.facts, self.option.partition(".")[0])
         if wrong := problem_with(value, self.facts):
             raise ValueError(wrong)
         return value
@@ -70,19 +56,10 @@ class Slot:
 
     def read(self, param: Param) -> Any:
         """The value of a parameter in a script, checked but not resolved; ValueError if it is wrong."""
-        value: Any = param.text
-        if self.kind == "bool":
-            value = {"true": True, "false": False}.get(value.lower(), value)
-        else:
-            for number in (int, float) if self.kind in ("float", "length") else (int,):
-                with suppress(ValueError):
-                    value = number(param.text)
-                    break
         try:
-            self.checked(value)
+            return self.checked(param.text)
         except ValueError as error:
-            raise ValueError(f"{error}, not {shown(value)}") from None
-        return value
+            raise ValueError(f"{error}, not {shown(param.text)}") from None
 
     def written(self, value: Any) -> Param:
         """The parameter in a script."""
@@ -127,18 +104,18 @@ class Verb:
 
         So are those of a filter that is not in it.
         """
-        made = {}
+        checked = {}
         for name, value in values.items():
             if name not in self.slots:
                 raise InvalidParameterError(did_you_mean(name, self.slots, f"parameter of {self.name}"))
             try:
-                made[name] = self.slots[name].checked(value)
+                checked[name] = self.slots[name].checked(value)
             except ValueError as error:
                 raise InvalidParameterError(f"{name} = {value!r}: {error}") from None
-        names = {self.slots[name].option: name for name in made if self.slots[name].option}
+        names = {self.slots[name].option: name for name in checked if self.slots[name].option}
         try:
-            start = named_pipeline(made.get("pipeline", "default"))
-            return start.with_options({option: made[name] for option, name in names.items()})
+            start = named_pipeline(checked.get("pipeline", "default"))
+            return start.with_options({option: checked[name] for option, name in names.items()})
         except InvalidParameterError as error:  # say it with the name that the verb has for it
             option, colon, why = str(error).partition(": ")
             raise InvalidParameterError(f"{names.get(option, option)}{colon}{why}") from None
@@ -182,8 +159,8 @@ class CrossCheckVerb(Verb):
 
     def run(self, layer: Layer, given: Mapping[str, Any], on_iteration: Callable[..., Any] | None = None) -> Layer:
         check = cross_check(layer.cloud(), pipeline=self.plan(given), mesh=given.get("mesh", "auto"))
-        told = {"verdict": check.verdict, "probability": check.probability, "because": check.reasons}
-        return dataclasses.replace(self.shown(check.points, layer), scalars=check.angle, told=told)
+        results = {"verdict": check.verdict, "probability": check.probability, "because": check.reasons}
+        return dataclasses.replace(self.shown(check.points, layer), scalars=check.angle, results=results)
 
 
 @cache
@@ -202,12 +179,12 @@ def verbs() -> dict[str, Verb]:
     layer = Slot("layer", parameter(None, "The layer to act on; -1 is the current one.", type="int", low=-1).metadata)
     slots = {slot.name: slot for slot in (*_slots_of_all(), layer)}
     of_check = {"pipeline": slots["pipeline"], "mesh": mesh, "layer": layer}
-    found = [
+    known = [
         Verb("generate_curve_skeleton_glsk", whole, slots, "a skeleton"),
         SegmentVerb("generate_segmented_cloud_glsk", segmented, {"layer": layer}, "points or a mesh"),
         CrossCheckVerb("get_curve_skeleton_crosscheck_glsk", checked, of_check, "points"),
     ]
-    return {verb.name: verb for verb in found}
+    return {verb.name: verb for verb in known}
 
 
 def _slots_of_all() -> list[Slot]:

@@ -45,16 +45,6 @@ def test_one_skeleton_of_a_scene(batch, scene, rows, tmp_path):
     assert np.isfinite(joined.confidence).any()
 
 
-def test_a_tile_with_too_few_points_is_accounted_for(tmp_path, write, run):
-    points = np.concatenate([samples.torus(800).points, [[5.0, 0, 0.1 * i] for i in range(3)]])
-    run(write(tmp_path / "few.xyz", points=points), tiles=1.5)
-    row, whole = run.result.rows["few.tiles/3-0-0"], run.result.rows["few"]
-    assert (row["status"], row["points"], row["vertices"]) == ("done", 3, 0)
-    assert row["messages"][0].startswith("no skeleton in this tile: 3 finite points")
-    assert whole["messages"] == ["1 of 2 tiles have no skeleton, of 3 points: the ledger says why"]
-    assert (whole["components"], whole["loops"]) == (1, 1)
-
-
 def test_what_is_done_is_not_done_again(batch, tmp_path, rows):
     batch()
     assert batch() == {}
@@ -152,22 +142,3 @@ def test_what_is_refused_leaves_no_folder_behind(scene, tmp_path, options, messa
     with pytest.raises(InvalidParameterError, match=message):
         run_batch(scene, tmp_path / "deep" / "out", **options)
     assert not (tmp_path / "deep").exists()
-
-
-@pytest.mark.parametrize("there", ["scene.ply", "recipe.json"])
-def test_what_is_refused_has_read_no_scene_and_left_no_parts(batch, tmp_path, monkeypatch, there):
-    import glsk_o3d.apps.batch.splitting as module
-
-    monkeypatch.delattr(module, "read_blocks")
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / there).write_text("mine")
-    with pytest.raises(InvalidParameterError, match=f"{there}: is not the result of a batch"):
-        batch()
-    assert not (tmp_path / "out" / ".parts").exists()
-
-
-def test_a_scene_that_cannot_be_read_fails_with_its_reason(tmp_path, run):
-    (tmp_path / "bad.ply").write_text("no")
-    run(tmp_path / "bad.ply", tiles=1.0)
-    assert run.result.rows["bad"]["error"].startswith("not a valid .ply file")
-    assert not list((tmp_path / "out").rglob("*.ply"))

@@ -1,15 +1,16 @@
 """MeshSet: MeshLab's filters and ours in one session and in one script."""
 
+import re
 import sys
 from pathlib import Path
 
 import numpy as np
+import open3d as o3d
 import pytest
 
 import glsk_o3d as glsk
 from glsk_o3d import to_pymeshlab
 from glsk_o3d.analysis import segment
-from glsk_o3d.apps.meshlab import builtin
 from glsk_o3d.apps.meshlab.layers import Layer
 from glsk_o3d.apps.meshlab.script import read_script
 from glsk_o3d.apps.meshlab.steps import read_steps
@@ -23,8 +24,6 @@ pymeshlab = pytest.importorskip("pymeshlab")
 POINTS = np.concatenate([sample_object(1000).points, sample_object(100).points, [[9.0, 9, 9], [9, -9, 9]]])
 LARGER = 1.7 * POINTS[:1000] @ np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
 WHOLE = "generate_curve_skeleton_glsk"
-
-OURS = '<FilterScript>\n<filter name="Generate Curve Skeleton (GLSkeleton)"/>\n</FilterScript>'
 
 
 def holding(*clouds):
@@ -43,16 +42,6 @@ def same(a, b):
     np.testing.assert_array_equal(a.vertices, b.vertices)
     np.testing.assert_array_equal(a.edges, b.edges)
     np.testing.assert_array_equal(a.radii, b.radii)
-
-
-def made(meshes, name, **params):
-    meshes.apply_filter(name, **params)
-    mesh = meshes.current_mesh()
-    return mesh.vertex_matrix().copy(), mesh.edge_matrix().copy(), mesh.vertex_scalar_array().copy()
-
-
-def equal(a, b):
-    return all(map(np.array_equal, a, b))
 
 
 def repeated(session, clouds, path):
@@ -116,27 +105,26 @@ def test_a_saved_script_repeats_what_meshlab_did_to_the_digits_that_it_writes(tm
 
 
 def test_a_filter_that_fails_names_file_line_and_filter(meshes, tmp_path):
-    (tmp_path / "s.mlx").write_text(
-        '<FilterScript>\n<filter name="Select None"/>\n<filter name="Close Holes"/>\n</FilterScript>'
-    )
-    meshes.load_filter_script(tmp_path / "s.mlx")
-    with pytest.raises(ScriptError, match=r"s.mlx, line 3: filter 'Close Holes': .*does not have Any Faces"):
-        meshes.apply_filter_script()
-    poisson = '<FilterScript>\n<filter name="Surface Reconstruction: Screened Poisson"/>\n</FilterScript>'
-    (tmp_path / "s.mlx").write_text(poisson)
-    meshes.load_filter_script(tmp_path / "s.mlx")
+    def load(meshes, name):
+        (tmp_path / "s.mlx").write_text(f'<FilterScript>\n<filter name="{name}"/>\n</FilterScript>')
+        meshes.load_filter_script(tmp_path / "s.mlx")
+        return meshes
+
     before = Path.cwd()
-    with pytest.raises(ScriptError, match=r"correct per vertex normals\. E\.g\. it is necessary that your ALL the"):
-        meshes.apply_filter_script()
+    for name, message in (
+        ("Close Holes", ".*does not have Any Faces"),
+        (
+            "Surface Reconstruction: Screened Poisson",
+            r".*correct per vertex normals\. E\.g\. it is necessary that your",
+        ),
+    ):
+        with pytest.raises(ScriptError, match=f"s.mlx, line 2: filter '{name}': {message}"):
+            load(meshes, name).apply_filter_script()
     assert Path.cwd() == before
-    (tmp_path / "s.mlx").write_text(OURS)
-    few = holding(np.eye(3))
-    with pytest.raises(ScriptError, match=r"s.mlx, line 2: filter 'Generate Curve Skeleton \(GLSkeleton\)': .*8 "):
-        few.apply_step(read_steps(tmp_path / "s.mlx")[0])
-    meshes.load_filter_script(tmp_path / "s.mlx")
-    meshes.clear()
-    with pytest.raises(ScriptError, match=r"filter 'Generate Curve Skeleton \(GLSkeleton\)': there is no layer"):
-        meshes.apply_filter_script()
+    ours = "Generate Curve Skeleton (GLSkeleton)"
+    for session, message in ((holding(np.eye(3)), ".*8 "), (glsk.MeshSet(), "there is no layer")):
+        with pytest.raises(ScriptError, match=rf"s.mlx, line 2: filter '{re.escape(ours)}': {message}"):
+            load(session, ours).apply_filter_script()
 
 
 # ---- lengths: percentages are of the diagonal of the layer's bounding box, as MeshLab's are
@@ -147,17 +135,10 @@ def test_a_filter_that_fails_names_file_line_and_filter(meshes, tmp_path):
 def test_a_percentage_is_of_the_box_of_the_layer(layer):
     meshes = holding(POINTS[:800], LARGER[:800])
     long = meshes.mesh(layer).bounding_box().diagonal() * 0.05
-    words = (long, np.float64(long), "5%", pymeshlab.PercentageValue(5))
-    plain, *others = [made(meshes, WHOLE, connector_radius=value, layer=layer) for value in words]
-    assert all(equal(plain, other) for other in others)
-
-
-def test_words_for_lengths_that_are_not_percentages(meshes):
-    meshes.generate_curve_skeleton_glsk(connector_radius=pymeshlab.PureValue(0.1), layer=0)
-    same(meshes.current_skeleton(), glsk.pipelines.default().with_options({"Connector.radius": 0.1})(POINTS))
-    for value in ("5 of it", "5% of the frame", "101%", "0%"):
-        with pytest.raises(InvalidParameterError, match=f"^connector_radius = '{value}': .*percentage"):
-            meshes.generate_curve_skeleton_glsk(connector_radius=value)
+    expected = glsk.pipelines.default().with_options({"Connector.radius": long})(meshes.mesh(layer).vertex_matrix())
+    for words in (long, np.float64(long), "5%", pymeshlab.PercentageValue(5)):
+        meshes.generate_curve_skeleton_glsk(connector_radius=words, layer=layer)
+        same(meshes.current_skeleton(), expected)
 
 
 def test_scripts_keep_percentages(tmp_path):
@@ -171,13 +152,6 @@ def test_scripts_keep_percentages(tmp_path):
     large.apply_step(read_steps(tmp_path / "s.mlx")[0])
     expected = 4096 * meshes.current_mesh().vertex_matrix()
     np.testing.assert_allclose(large.current_mesh().vertex_matrix(), expected, rtol=1e-9, atol=1e-9)
-
-
-def test_points_that_are_dropped_have_no_part_in_the_box():
-    spoilt = Layer.of(np.concatenate([LARGER, [[np.nan, 1e6, 0], [0, np.inf, 0]]]))
-    params = {"connector_radius": "5%", "sampler_drop_invalid": True}
-    found, clean = (verbs()[WHOLE].run(layer, params) for layer in (spoilt, Layer.of(LARGER)))
-    same(found.skeleton, clean.skeleton)
 
 
 # ---- layers
@@ -219,7 +193,6 @@ def test_a_segmentation_has_the_points_and_faces_of_its_skeleton():
     ("name", "params", "message"),
     [
         ("generate_curve_skeleton_glks", {}, "no filter is called .*: did you mean 'generate_curve_skeleton_glsk'"),
-        ("meshing_remove_duplicated_vertices", {}, "no filter .* did you mean 'meshing_remove_duplicate_vertices'"),
         (WHOLE, {"conector_radius": 1}, f"no parameter of {WHOLE} is .* did you mean 'connector_radius'"),
         (WHOLE, {"connector_radius": "2 mm"}, "connector_radius = '2 mm': must be a number in"),
         (WHOLE, {"ringbuilder_k": 12.5}, "ringbuilder_k = 12.5: must be an int, or 'auto'"),
@@ -242,16 +215,6 @@ def test_layers_that_are_no_scans(meshes):
     meshes.generate_curve_skeleton_glsk()
     with pytest.raises(InvalidCloudError, match="is a skeleton or another line drawing"):
         meshes.generate_curve_skeleton_glsk()
-
-
-def test_what_meshlab_does_to_our_layers_is_kept(meshes, tmp_path):
-    def saved():
-        meshes.layer().save(tmp_path / "c.ply")
-        return Layer.read(tmp_path / "c.ply")
-
-    meshes.generate_segmented_cloud_glsk()
-    meshes.compute_color_by_function_per_vertex(x="255", y="0", z="0")
-    np.testing.assert_array_equal(saved().colors, np.tile([1, 0, 0, 1], (len(POINTS), 1)))
 
 
 def test_scalars_of_a_skeleton_are_its_radii_and_moved_vertices_its_own(meshes, tmp_path):
@@ -282,35 +245,13 @@ def test_scalars_of_a_skeleton_are_its_radii_and_moved_vertices_its_own(meshes, 
 
 
 def test_listings_have_both_kinds(capfd, meshes):
-    names = glsk.MeshSet.filter_list()
-    assert {"meshing_remove_duplicate_vertices", *verbs()} <= set(names)
+    assert {"meshing_remove_duplicate_vertices", *verbs()} <= set(glsk.MeshSet.filter_list())
     assert {*verbs()} <= set(dir(glsk.MeshSet))
-    assert "curve skeleton" in glsk.MeshSet.generate_curve_skeleton_glsk.__doc__
     meshes.print_filter_parameter_list(WHOLE)
     assert "\nringbuilder_k : " in capfd.readouterr().out
-    with pytest.raises(InvalidParameterError, match="did you mean 'generate_curve_skeleton_glsk'"):
-        meshes.print_filter_parameter_list("generate_curve_skeletons_glsk")
     meshes.generate_curve_skeleton_glsk(ringbuilder_k=9)
     meshes.print_filter_script()
     assert '<Param type="RichInt" name="ringbuilder_k" value="9"/>' in capfd.readouterr().out
-
-
-def test_which_parameters_are_layers():
-    later = pymeshlab.MeshSet()
-    for _ in range(3):
-        later.add_mesh(builtin.trial().mesh(0))
-    for number in (0, 1):
-        later.set_current_mesh(number)
-        later.delete_current_mesh()
-    later.set_current_mesh(2)
-    unlike_elsewhere = set()
-    for name in pymeshlab.filter_list():
-        here, there = builtin.trial().filter_parameter_values(name), later.filter_parameter_values(name)
-        ours = {key for key, value in here.items() if builtin.is_layer(key, value)}
-        theirs = {key for key, value in here.items() if type(value) is int and value != there[key]}
-        assert theirs <= ours
-        unlike_elsewhere |= ours - theirs
-    assert unlike_elsewhere == {"referencemesh", "sourcemesh", "basemesh"}  # the first layer, whatever there is
 
 
 def test_a_skeleton_as_a_mesh_of_meshlab(skeleton, tmp_path, monkeypatch):
@@ -326,3 +267,30 @@ def test_a_skeleton_as_a_mesh_of_meshlab(skeleton, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pymeshlab", None)
     with pytest.raises(MissingPackageError, match=r"pymeshlab.*pip install .glsk-o3d.meshlab"):
         to_pymeshlab(skeleton)
+
+
+def test_normals_turn_with_the_matrix_of_a_layer():
+    points, normals = np.random.default_rng(0).normal(size=(2, 50, 3))
+    meshes = pymeshlab.MeshSet()
+    meshes.add_mesh(pymeshlab.Mesh(points, v_normals_matrix=normals))
+    turn = np.eye(4)[[1, 0, 2, 3]] * [-1, 1, 1, 1]
+    meshes.set_matrix(transformmatrix=turn, freeze=False)
+    layer = Layer.of_mesh(meshes.current_mesh())
+    np.testing.assert_allclose(layer.vertices, points @ turn[:3, :3].T)
+    np.testing.assert_allclose(layer.normals, normals @ turn[:3, :3].T)
+
+
+def test_a_mesh_is_read_as_it_was_written(tmp_path):
+    mesh = o3d.geometry.TriangleMesh.create_torus()
+    mesh.compute_vertex_normals()
+    points, faces, normals = (np.array(each) for each in (mesh.vertices, mesh.triangles, mesh.vertex_normals))
+    colors = np.random.default_rng(0).integers(256, size=(len(points), 4)) / 255
+    colors[:, 3] = 1
+    layer = Layer(points, faces=faces, normals=normals, colors=colors, scalars=np.arange(len(points)) / 3)
+    for ending in ("xyz", "ply"):
+        layer.save(tmp_path / f"m.{ending}")
+        back = Layer.read(tmp_path / f"m.{ending}")
+        np.testing.assert_array_equal(back.vertices, points)
+    for name in ("faces", "normals", "scalars"):
+        np.testing.assert_array_equal(getattr(back, name), getattr(layer, name))
+    np.testing.assert_allclose(back.colors, colors)
