@@ -142,6 +142,8 @@ def test_links_and_paths_lead_somewhere(path):
 def test_every_page_is_in_the_menu_and_every_picture_is_shown():
     menu = "".join(re.findall(r"```\{toctree\}(.*?)```", page("index.md"), re.DOTALL)).split()
     assert {path.stem for path in ROOT.glob("docs/*.md")} - {"index"} <= {*menu}
+    searched = re.findall(r'^    "([\w/]+)":', (ROOT / "docs/_ext/keywords.py").read_text(), re.MULTILINE)
+    assert [name for name in searched if not (ROOT / f"{name}.md").exists() and "generated" not in name] == []
     shown = [picture for text in PROSE.values() for picture in re.findall(r"!\[(.*?)\]\((.*?)\)", text)]
     assert all(words for words, _ in shown)
     assert {f"{draw.__name__}.png" for draw in figures.FIGURES} <= {Path(target).name for _, target in shown}
