@@ -62,23 +62,23 @@ def batch(
     if dry_run:
         _tell_plan(batches.plan_batch(inputs, output, **what))
         return
-    plans: list[batches.Plan] = []
-    done = count(1)
+    left_out, total, done = dict[str, str](), 0, count(1)
     with progress(remaining=True) as update:
         update("looking for what is done")
 
         def begin(plan: batches.Plan) -> None:
-            plans.append(plan)
+            nonlocal left_out, total
+            left_out, total = plan.left_out, len(plan.todo)
             _say_left_out(plan)
 
         def step(row: dict[str, Any]) -> None:
-            update(f"done: {row['input']}", next(done), len(plans[0].todo))
+            update(f"done: {row['input']}", next(done), total)
             if row["status"] == "failed" and not flags.quiet:
                 say("warning", f"{row['input']}: {row['error']}")
 
         what |= dict(workers=workers, scheduler=scheduler, on_plan=begin, on_result=step)
         result = batches.run_batch(inputs, output, **what)
-    _tell_result(result, plans[0].left_out)
+    _tell_result(result, left_out)
 
 
 def _tell_result(result: batches.BatchResult, left_out: dict[str, str]) -> None:
