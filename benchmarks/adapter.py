@@ -1,49 +1,10 @@
-"""One of the other tools on one cloud: what `glsk benchmark run --command` calls, from a file to a file.
-
-The README beside this file says how, docs/comparison.md how each tool is called. No tool is warmed up.
-"""
-
-from __future__ import annotations
+"""One of the other tools on one cloud: see the README."""
 
 import os
 
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MPLBACKEND="Agg")  # before NumPy
 
-from pathlib import Path
-from typing import Annotated
-
-import numpy as np
-import typer
-from _peers import PEERS, installed, one_thread, silence, skeleton_of
-from _trees import TOOLS, upright
-
-from glsk_o3d import read_cloud, save_skeleton
-from glsk_o3d.interop.clouds import cloud_points
-
-KNOWN = PEERS | {name: tool for name, tool in TOOLS.items() if name not in PEERS}
-"""All tools; those of trees take z for up, and others do not mind."""
-app = typer.Typer(pretty_exceptions_enable=False, rich_markup_mode=None, add_completion=False)
-
-
-@app.command(help=__doc__)
-def main(
-    tool: Annotated[str, typer.Argument(metavar="TOOL", help=f"One of {', '.join(KNOWN)}.")],
-    cloud: Annotated[Path, typer.Argument(metavar="CLOUD", help="As for glsk skeletonize.")],
-    skeleton: Annotated[Path, typer.Argument(metavar="SKELETON", help="Any format of skeletons.")],
-    up: Annotated[str, typer.Option("--up", metavar="AXIS", help="That points up, for tools of trees: x, y, z.")] = "z",
-) -> None:
-    if tool not in KNOWN:
-        raise typer.BadParameter(f"no tool {tool}: there are {', '.join(KNOWN)}")
-    if up not in ("x", "y", "z"):
-        raise typer.BadParameter(f"--up {up}: there are x, y and z")
-    (peer,) = installed(KNOWN, tool).values()
-    turn = upright(up)
-    one_thread()
-    points = cloud_points(read_cloud(cloud))
-    with silence():
-        vertices, edges = peer(np.ascontiguousarray(points[:, turn]))
-    save_skeleton(skeleton_of(vertices[:, np.argsort(turn)], edges), skeleton)
-
+from glsk_studies.adapter import app
 
 if __name__ == "__main__":
     app()

@@ -26,14 +26,10 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_gallery.gen_gallery",
     "sphinxcontrib.bibtex",
-    "generated",  # these are in _ext
+    "api",  # these are in _ext
     "keywords",
     "mathml",
-    "steering_table",
-    "options",
-    "sidebar",
     "tables",
-    "thumbnails",
 ]
 root_doc = "docs/index"
 include_patterns = ["*.md", "docs/**", "benchmarks/README.md", "filters/README.md"]
@@ -69,8 +65,8 @@ sphinx_gallery_conf = dict(
     show_memory=False,
     show_signature=False,
     within_subsection_order="FileNameSortKey",
-    image_scrapers=("thumbnails.scrape",),
     thumbnail_size=(480, 360),
+    remove_config_comments=True,
     write_computation_times=False,
 )
 
@@ -78,7 +74,6 @@ smartquotes = False
 templates_path = ["_templates"]
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
-html_js_files = ["site.js"]
 html_theme = "furo"
 html_use_index = html_domain_indices = False  # the reference goes by task, and words are searched for
 pygments_dark_style = "github-dark"

@@ -139,7 +139,7 @@ def remove_redundant_points(cloud: Any, *, passes: int = 1) -> tuple[Any, Any]:
     if name == "TriangleMesh":
         raise InvalidCloudError("points cannot be removed from a mesh: make a cloud of its vertices first")
     contraction = Contractor(reducer=LPRReducer(), max_iterations=int(passes), stop=lambda iterations: None)
-    kept = np.sort((RingBuilder() | contraction)(cloud).point_of_survivor)
+    kept = np.sort((RingBuilder() | contraction)(cloud).map.point_of_survivor)
     if name == "PointCloud" and not tensor:
         return cloud.select_by_index(kept), kept.tolist()
     if tensor:

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from .curve.surface import ENOUGH_POINTS
+from .curve.numbers import CURVE
 from .data.contraction import Contraction
 from .data.skeleton import Skeleton
 from .filters.connector import Connector
@@ -94,7 +94,7 @@ def tree(root: str | Any = "z") -> Pipeline[Cloud, Skeleton]:
 
 def _graph() -> Pipeline[Cloud, Skeleton]:
     """The raw graph of `default`. Its merges wait for large clouds: which pairs they take hangs on the least change."""
-    return rings() | Contractor(reducer=LPRReducer(least=2 * ENOUGH_POINTS)) | Connector()
+    return rings() | Contractor(reducer=LPRReducer(least=2 * CURVE.enough_points)) | Connector()
 
 
 def rings() -> Pipeline[Cloud, Contraction]:

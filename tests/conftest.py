@@ -7,7 +7,6 @@ import shutil
 import sys
 import textwrap
 from concurrent.futures import Future
-from contextlib import contextmanager
 from dataclasses import fields, replace
 from pathlib import Path
 from time import sleep
@@ -77,47 +76,12 @@ def no_run(monkeypatch):
     monkeypatch.setattr(RingBuilder, "run", run)
 
 
-@pytest.fixture(scope="session")
-def benchmark(root):
-    """A context with a benchmark as a module. The processes that it starts find it too; afterwards nobody does."""
-    folder = root / "benchmarks"
-
-    @contextmanager
-    def imported(name):
-        before = {*sys.modules}
-        with pytest.MonkeyPatch.context() as patch:
-            patch.syspath_prepend(str(folder))
-            yield importlib.import_module(name)
-        for new in {*sys.modules} - before:
-            if folder in Path(getattr(sys.modules[new], "__file__", None) or "").parents:
-                del sys.modules[new]
-
-    return imported
-
-
-@pytest.fixture(scope="module")
-def tool(request, benchmark):
-    """The benchmark that a test's module names TOOL, as a module."""
-    with benchmark(request.module.TOOL) as module:
-        yield module
-
-
-@pytest.fixture(scope="module")
-def parts(tool):
-    """The modules that it is made of, by their names."""
-    folder = Path(tool.__file__).parent
-    found = {name: module for name, module in sys.modules.items() if name.startswith("_")}
-    return SimpleNamespace(
-        **{n[1:]: each for n, each in found.items() if Path(getattr(each, "__file__", None) or "").parent == folder}
-    )
-
-
 @pytest.fixture
-def call(tool):
-    """Run a command of `tool`; gives what it printed."""
+def call(request):
+    """Run a command of the study that a test's module names STUDY; gives what it printed."""
 
     def run(*arguments, code=0):
-        result = CliRunner().invoke(tool.app, [*map(str, arguments)])
+        result = CliRunner().invoke(request.module.STUDY.app, [*map(str, arguments)])
         assert result.exit_code == code, result.output
         return result.output
 

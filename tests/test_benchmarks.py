@@ -7,6 +7,7 @@ from itertools import chain
 
 import numpy as np
 import pytest
+from glsk_studies import ablation, accuracy, axes, batch, clouds, crosscheck, options
 from typer.testing import CliRunner
 
 from glsk_o3d import Denoiser, OutlierRemover, Thinner, Tracer, pipelines, read_cloud
@@ -14,7 +15,7 @@ from glsk_o3d.apps.batch import run_batch
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.samples import torus
 
-TOOL = "accuracy"
+STUDY = accuracy
 
 FEW = ("--builtin", "--shapes", "torus", "--variant", "clean_512", "--jobs", 0)
 
@@ -33,9 +34,9 @@ def failed(shape, variant="clean_512", pipeline="default", **values):
 
 
 @pytest.mark.parametrize("kind", ["clean", "density", "holes", "outliers", "noise2", "scan2"])
-def test_builtin_clouds_have_their_size_and_follow_from_their_draw(parts, kind):
-    for shape in parts.clouds.BUILTIN:
-        first, again, second = (parts.clouds.builtin(shape, f"{kind}_300", draw)[0] for draw in (0, 0, 1))
+def test_builtin_clouds_have_their_size_and_follow_from_their_draw(kind):
+    for shape in clouds.BUILTIN:
+        first, again, second = (clouds.builtin(shape, f"{kind}_300", draw)[0] for draw in (0, 0, 1))
         assert first.shape == (300, 3)
         np.testing.assert_array_equal(first, again)
         assert not (first == second).all(axis=1).any()
@@ -59,8 +60,8 @@ def zoo(tmp_path):
 
 
 class TestFolders:
-    def test_families_seeds_and_draws(self, parts, zoo, capsys):
-        found = parts.clouds.cases(zoo, False, "clean_512,scan2_512,depth2_512")
+    def test_families_seeds_and_draws(self, zoo, capsys):
+        found = clouds.cases(zoo, False, "clean_512,scan2_512,depth2_512")
         told = [(case.variant, *(case.facts[name] for name in ("family", "seed", "draw"))) for case in found]
         rings = [("rings", 0, 0), ("rings", 1, 0), ("rings", 1, 1)]
         assert told == [
@@ -70,8 +71,8 @@ class TestFolders:
         assert [case.folder for case in found[1:3]] == list(zoo)
         assert capsys.readouterr().err == "left out: scan2_512 of 2 shapes\nleft out: depth2_512 of 4 shapes\n"
 
-    def test_a_public_benchmark(self, parts, small):
-        found = parts.clouds.cases(small.path, False, "*")
+    def test_a_public_benchmark(self, small):
+        found = clouds.cases(small.path, False, "*")
         assert {(case.shape, case.variant) for case in found} == {(it.shape, it.variant) for it in small.scored}
         points, axis = found[0].load()
         np.testing.assert_array_equal(points, read_cloud(small.scored[0].path).points)
@@ -80,14 +81,14 @@ class TestFolders:
 
 
 class TestArithmetic:
-    def test_differences_are_paired(self, parts, capsys):
+    def test_differences_are_paired(self, capsys):
         names = [f"rings_{i}" for i in range(20)]
         before = [row(it, error=0.1 + 0.01 * i, topology=i < 10, seed=i) for i, it in enumerate(names)]
         after = [row(it, error=0.09 + 0.01 * i, topology=i not in (3, 19), seed=i) for i, it in enumerate(names)]
         after[0] = failed(names[0], seed=0)
-        pairs = parts.accuracy.paired([*before, row("gone")], after)
+        pairs = axes.paired([*before, row("gone")], after)
         assert capsys.readouterr().err == "left out: 1 clouds that only one file has\n"
-        ((_, header, (line,)),) = parts.accuracy.difference_tables(pairs)
+        ((_, header, (line,)),) = axes.difference_tables(pairs)
         told = dict(zip(header[-2:], line[-2:], strict=True))
         assert told == {"now right": ", ".join(names[10:19]), "now wrong": "rings_0, rings_3"}
         assert line[:4] == ["clean_512", "`default`", "20", "0.50 → 0.85"]
@@ -95,13 +96,13 @@ class TestArithmetic:
         assert line[5] == "1.00 → 0.95"
         assert line[7:9] == ["0.200 → 0.190", "-0.010 [-0.010, -0.010]"]  # of the pairs that both have one
 
-    def test_the_paper_has_what_ideas_are_worth(self, tool, root):
+    def test_the_paper_has_what_ideas_are_worth(self, root):
         page = (root / "docs" / "paper.md").read_text(encoding="utf-8")
-        assert f"<!-- worth -->\n\n{tool.worth_text()}" in page
+        assert f"<!-- worth -->\n\n{accuracy.worth_text()}" in page
 
 
-def test_all_ideas_off_are_the_publications(parts):
-    off = {name: setting.split() for name, setting in parts.accuracy.IDEAS.items()}
+def test_all_ideas_off_are_the_publications():
+    off = {name: setting.split() for name, setting in ablation.IDEAS.items()}
     wen = chain.from_iterable(setting for name, setting in off.items() if name != "stop by score")
     idle = (OutlierRemover(outlier_factor=0), Denoiser(denoise=0), Thinner(thin_to="all", around=20))
 
@@ -134,7 +135,7 @@ class TestCommands:
         same = call("compare", saved[0], saved[0], "--markdown")
         assert "| all | `default` | 7 | 1.00 → 1.00 | +0.00 [+0.00, +0.00] |" in same
 
-    def test_a_page_and_its_pictures(self, tool, call, tmp_path, monkeypatch):
+    def test_a_page_and_its_pictures(self, call, tmp_path, monkeypatch):
         saved = [tmp_path / f"{command}.json" for command in ("truth", "ablation", "stop")]
         effects = tmp_path / "effects.md"
         effects.write_text("| `Refiner.limb=0`:  |")
@@ -154,7 +155,7 @@ class TestCommands:
         pictures = {path.stem for path in (tmp_path / "images").iterdir()}
         assert pictures == {"accuracy_clouds", "accuracy_ideas", "accuracy_solves"}
         page.write_text("<!-- worth -->\n<!-- end -->\n")
-        monkeypatch.setattr(tool, "WORTH_KEPT", tmp_path / "kept.json.gz")
+        monkeypatch.setattr(accuracy, "WORTH_KEPT", tmp_path / "kept.json.gz")
         call("worth", page, saved[1])
         assert "| without thinning |" in page.read_text()
 
@@ -171,26 +172,23 @@ class TestCommands:
             assert "Invalid value" in call("truth", "--builtin", *wrong, code=2)
 
 
-def test_cross_checks(benchmark):
+def test_cross_checks():
     words = "verdicts --builtin --shapes tube,torus --variant clean_1500 --jobs 0"
-    with benchmark("crosscheck") as module:
-        printed = CliRunner().invoke(module.app, words.split()).output
+    printed = CliRunner().invoke(crosscheck.app, words.split()).output
     assert "clean_1500 2 / 2 0 / 0 0 / 0" in " ".join(printed.split())
 
 
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")  # the work is done in this process
 @pytest.mark.usefixtures("at_once")
-def test_scans_for_batches(benchmark, tmp_path):
+def test_scans_for_batches(tmp_path):
     (tmp_path / "in").mkdir()
-    with benchmark("batch") as batch:
-        batch.make_scans(tmp_path / "in", 3, 256, 400)
-        result = run_batch(tmp_path / "in", tmp_path / "out")
+    batch.make_scans(tmp_path / "in", 3, 256, 400)
+    result = run_batch(tmp_path / "in", tmp_path / "out")
     failed = {name[5:] for name, row in result.rows.items() if row["status"] == "failed"}
     assert failed == {name.partition(".")[0] for name in batch.CORRUPT}
     assert all(256 <= row["points"] <= 400 for row in result.rows.values() if row["status"] == "done")
 
 
-def test_measures_of_options(benchmark):
-    with benchmark("options") as options:
-        found = options.measure("`torus`", "Refiner.spacing=1", 0)
+def test_measures_of_options():
+    found = options.measure("`torus`", "Refiner.spacing=1", 0)
     assert (found["topology"], found["leaves"]) == (True, 0)

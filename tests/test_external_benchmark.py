@@ -4,10 +4,11 @@ import numpy as np
 import open3d as o3d
 import pytest
 from glsk_bench import read_folder
+from glsk_studies import external
 
 from glsk_o3d import Skeleton, samples
 
-TOOL = "external"
+STUDY = external
 
 FORK = samples.y_junction(2000)
 BRANCHES = "v 0 0 0\nv 0 4 0\nv 0 8 0\nv 0 4 0\nv 3 7 0\nv 0 4 0\nv 0 7 3\nl 1 2 3\nl 4 5\nl 6 7\n"
@@ -123,11 +124,11 @@ def centrelines():
     return [np.column_stack([x, y, t]) + rng.normal(0, 0.02, (201, 3)) for x, y in paths]
 
 
-def test_lines_are_joined_where_they_part_and_not_where_they_touch(parts):
+def test_lines_are_joined_where_they_part_and_not_where_they_touch():
     nodes, forks = np.vstack(centrelines()), []
     split = np.split(np.arange(603), 3)
     for order in ((0, 1, 2), (2, 0, 1), (1, 2, 0)):
-        edges = parts.external.joined(nodes, np.ones(603), [split[i] for i in order])
+        edges = external.joined(nodes, np.ones(603), [split[i] for i in order])
         degree = np.bincount(edges.ravel(), minlength=603)
         assert ((degree == 1).sum(), (degree == 3).sum(), (degree > 3).sum()) == (4, 2, 0)
         assert len(edges) == (degree > 0).sum() - 1  # one tree

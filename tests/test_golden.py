@@ -44,8 +44,8 @@ def golden(request):
         reduced=WEN.reducer(solved),
         cao=CAO(start),
         wen=WEN(start),
-        row=built.representative_of_point,
-        point=built.point_of_survivor,
+        row=built.map.row_of_point,
+        point=built.map.point_of_survivor,
     )
 
 
@@ -145,20 +145,20 @@ def test_merge_energy(golden):
 def test_first_pass_keeps_the_same_points_and_merges_the_same_pairs(golden):
     z, reduced = golden.recorded, golden.reduced
     kept = np.zeros(len(z.points), bool)
-    kept[reduced.point_of_survivor] = True
+    kept[reduced.map.point_of_survivor] = True
     np.testing.assert_array_equal(kept, z.keep1)
     np.testing.assert_array_equal(z.merged_into1 >= 0, ~z.keep1)
     expected = np.where(z.keep1, np.arange(len(kept)), z.merged_into1)
-    np.testing.assert_array_equal(reduced.point_of_survivor[reduced.survivor_of_point], expected)
+    np.testing.assert_array_equal(reduced.map.point_of_survivor[reduced.survivor_of_point], expected)
 
 
 def test_rings_after_the_first_pass(golden):
     z, reduced = golden.recorded, golden.reduced
     name = np.flatnonzero(z.keep1)  # their indices count the survivors
     recorded = [(name[k].tolist(), closed) for k, closed in as_recorded(z.ring_after1_indptr, z.ring_after1_indices)]
-    built = as_built(reduced.rings, reduced.point_of_survivor)
+    built = as_built(reduced.rings, reduced.map.point_of_survivor)
     at = np.empty(len(z.points), int)
-    at[reduced.point_of_survivor] = np.arange(len(reduced))
+    at[reduced.map.point_of_survivor] = np.arange(len(reduced))
     differ = [i for i, ring in zip(name, recorded, strict=True) if canonical(*ring) != canonical(*built[at[i]])]
     assert differ == []
 

@@ -6,13 +6,15 @@ import signal
 import time
 
 import numpy as np
-from glsk_bench import Results, leaderboard, read_folder, read_results
+from glsk_bench import Results, read_folder, read_results
+from glsk_bench import leaderboard as make_leaderboard
 from glsk_bench.scoring import Scores
+from glsk_studies import adapter, board, leaderboard, runs
 from typer.testing import CliRunner
 
 from glsk_o3d import read_skeleton
 
-TOOL = "leaderboard"
+STUDY = leaderboard
 
 SHARES = ("perfect", "topology", "tips_f1", "junctions_f1")
 
@@ -23,48 +25,45 @@ def row(shape="tubes_100", variant="clean", **values):
     return facts | found | dict(error=0.1, inside=1.0, completeness=1.0, ends=0.2, length=1.0) | values
 
 
-def entries(parts, **rows):
-    return [
-        parts.leaderboard.Entry(Results("v1", name, True, here), dict(hours=1.5, commit="c"))
-        for name, here in rows.items()
-    ]
+def entries(**rows):
+    return [board.Entry(Results("v1", name, True, here), dict(hours=1.5, commit="c")) for name, here in rows.items()]
 
 
 class TestTables:
-    def test_losses_are_worse_means_with_their_intervals(self, parts):
+    def test_losses_are_worse_means_with_their_intervals(self):
         shapes = [f"tubes_{seed}" for seed in range(100, 112)]
         ours = [row(it, error=0.2, ends=None) for it in shapes]
         better = [row(it, error=0.1, topology=0.0, ends=0.1) for it in shapes]
         now_and_then = [row(it, error=0.1 if i % 3 else 0.35) for i, it in enumerate(shapes)]
         hardly = [row(it, error=0.1999) for it in shapes]
-        found = parts.leaderboard.worse(entries(parts, default=ours, cgal=better, pygel=now_and_then, thinning=hardly))
-        lines = parts.leaderboard.losses(found)[2]
+        found = board.worse(entries(default=ours, cgal=better, pygel=now_and_then, thinning=hardly))
+        lines = board.losses(found)[2]
         assert [line[0] for line in lines] == ["all", "clean", "tubes"]
         assert lines[0][1:] == ["12", "error", "CGAL of wrap", "0.100", "0.200", "-0.100 [-0.100, -0.100]"]
         _, low, high = found[1].difference
         assert found[1][:4] == ("all", "pygel", "error", 12)
         assert low < -0.017 < 0 < high
-        assert parts.leaderboard.unclear(found)[2] == [
+        assert board.unclear(found)[2] == [
             ["error", "PyGEL3D of coarser wrap", "all (-0.017), clean (-0.017), tubes (-0.017)"]
         ]
 
 
 class TestKept:
-    def test_the_pages_have_what_is_kept(self, tool, parts, root):
+    def test_the_pages_have_what_is_kept(self, root):
         pages = "".join((root / name).read_text(encoding="utf-8") for name in ("README.md", "docs/comparison.md"))
-        for version in tool.PARTS:
-            found = parts.leaderboard.kept(version)
-            rows = leaderboard(entry.results for entry in found).entries if found else []
-            for name, text in tool.pieces(version, found, rows).items():
+        for version in leaderboard.PARTS:
+            found = board.kept(version)
+            rows = make_leaderboard(entry.results for entry in found).entries if found else []
+            for name, text in leaderboard.pieces(version, found, rows).items():
                 there = re.search(rf"<!-- {name} -->\n(.*?)<!-- end -->", pages, re.S)[1].strip()
                 if name != "recorded":  # late solves of wen2024 round otherwise elsewhere
                     assert there == text.strip()
 
 
 class TestCommands:
-    def test_run_keeps_the_scores_and_goes_on(self, tool, parts, call, small, tmp_path, monkeypatch):
-        monkeypatch.setattr(tool, "make", lambda place, version, jobs: read_folder(place))
-        monkeypatch.setattr(parts.leaderboard, "KEPT", tmp_path)
+    def test_run_keeps_the_scores_and_goes_on(self, call, small, tmp_path, monkeypatch):
+        monkeypatch.setattr(leaderboard, "make", lambda place, version, jobs: read_folder(place))
+        monkeypatch.setattr(board, "KEPT", tmp_path)
         assert "default.json.gz: 0 failures" in call("run", tmp_path, "--tool", "default", "--jobs", 2)
         rows = read_results(tmp_path / "v1" / "default.json.gz").rows
         assert len(rows) == 7
@@ -79,44 +78,43 @@ class TestCommands:
         call("picture", tmp_path, tmp_path / "p.png", "--cloud", "tubes_100_clean", "--tool", "default,cgal")
         assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
 
-    def test_pages_are_filled_or_all_is_printed(self, tool, parts, call, tmp_path, monkeypatch):
-        monkeypatch.setattr(tool, "kept", lambda version: entries(parts, default=[row()]) if version == "v1" else [])
-        monkeypatch.setattr(tool, "IMAGES", tmp_path)
-        words = {name: f"of {name}" for name in tool.PARTS["v1"]}
-        monkeypatch.setattr(tool, "pieces", lambda version, entries, rows: words if entries else {})
+    def test_pages_are_filled_or_all_is_printed(self, call, tmp_path, monkeypatch):
+        monkeypatch.setattr(leaderboard, "kept", lambda version: entries(default=[row()]) if version == "v1" else [])
+        monkeypatch.setattr(leaderboard, "IMAGES", tmp_path)
+        words = {name: f"of {name}" for name in leaderboard.PARTS["v1"]}
+        monkeypatch.setattr(leaderboard, "pieces", lambda version, entries, rows: words if entries else {})
         one = tmp_path / "one.md"
         others = "<!-- another -->\nkept\n<!-- end -->\n<!-- things-short -->\nto come\n<!-- end -->\n"
         one.write_text(f"<!-- short -->\n<!-- end -->\n{others}")
         call("page", one)
         assert one.read_text() == f"<!-- short -->\n\nof short\n<!-- end -->\n{others}"
         assert sorted(path.name for path in tmp_path.glob("*.png")) == ["leaderboard.png"]
-        assert call("page").split() == [word for name in tool.PARTS["v1"] for word in ("of", name)]
+        assert call("page").split() == [word for name in leaderboard.PARTS["v1"] for word in ("of", name)]
 
-    def test_repeat_keeps_how_far_answers_are_apart(self, tool, parts, call, rods, tmp_path, monkeypatch):
-        monkeypatch.setattr(parts.leaderboard, "KEPT", tmp_path)
+    def test_repeat_keeps_how_far_answers_are_apart(self, call, rods, tmp_path, monkeypatch):
+        monkeypatch.setattr(board, "KEPT", tmp_path)
         words = ("--tool", "default", "--version", "v1", "--draws", 2)
         assert "repeat_things.json.gz: default: moved 0." in call("repeat", tmp_path, *words)
         assert len([*tmp_path.glob("repeat_things/default/*.npz")]) == 12
-        (found,) = parts.leaderboard.repeats("v1", "things")
+        (found,) = board.repeats("v1", "things")
         assert [each["draws"] for each in found.rows] == [2] * 6
-        _, header, (line,) = parts.leaderboard.repeated([found])
+        _, header, (line,) = board.repeated([found])
         cells = dict(zip(header, line, strict=True))
         assert (cells[""], cells["loops"], cells["failures"]) == ("`default`", "1.00 [1.00, 1.00]", "0")
 
 
 class TestTools:
-    def test_the_adapter_goes_from_a_file_to_a_file_whatever_points_up(self, benchmark, tmp_path):
+    def test_the_adapter_goes_from_a_file_to_a_file_whatever_points_up(self, tmp_path):
         """Level sets begin at the lowest point: turned with the cloud, they are the same."""
         points = np.random.default_rng(0).normal(scale=[0.05, 0.05, 1.0], size=(500, 3))
         found = {}
-        with benchmark("adapter") as adapter:
-            for up, turn in (("y", [1, 2, 0]), ("z", [0, 1, 2])):
-                np.savetxt(tmp_path / f"{up}.xyz", points[:, turn])
-                words = ["levels", tmp_path / f"{up}.xyz", tmp_path / f"{up}.obj", "--up", up]
-                assert CliRunner().invoke(adapter.app, [*map(str, words)]).exit_code == 0
-                found[up] = read_skeleton(tmp_path / f"{up}.obj").vertices[:, np.argsort(turn)]
-            for wrong in (["magic", "c.xyz", "s.obj"], ["levels", "c.xyz", "s.obj", "--up", "w"]):
-                assert CliRunner().invoke(adapter.app, wrong).exit_code == 2
+        for up, turn in (("y", [1, 2, 0]), ("z", [0, 1, 2])):
+            np.savetxt(tmp_path / f"{up}.xyz", points[:, turn])
+            words = ["levels", tmp_path / f"{up}.xyz", tmp_path / f"{up}.obj", "--up", up]
+            assert CliRunner().invoke(adapter.app, [*map(str, words)]).exit_code == 0
+            found[up] = read_skeleton(tmp_path / f"{up}.obj").vertices[:, np.argsort(turn)]
+        for wrong in (["magic", "c.xyz", "s.obj"], ["levels", "c.xyz", "s.obj", "--up", "w"]):
+            assert CliRunner().invoke(adapter.app, wrong).exit_code == 2
         np.testing.assert_allclose(found["y"], found["z"], atol=1e-12)
 
 
@@ -128,9 +126,9 @@ def crash_or_work(job):
     return dict(inverse=1 / job)
 
 
-def test_jobs_that_crash_or_hang_are_failures_and_end_nothing(parts):
+def test_jobs_that_crash_or_hang_are_failures_and_end_nothing():
     jobs = [({}, (job,)) for job in ("crash", 0, "hang", 4)]
-    crashed, failing, hung, fine = parts.runs.run(crash_or_work, jobs, 2, fresh=True, limit=8, preload=["numpy"])
+    crashed, failing, hung, fine = runs.run(crash_or_work, jobs, 2, fresh=True, limit=8, preload=["numpy"])
     assert crashed == {"failure": "its process died: SIGSEGV"}
     assert failing == {"failure": "ZeroDivisionError: division by zero"}
     assert hung == {"failure": "not done after 8 s"}

@@ -5,45 +5,46 @@ from itertools import count
 
 import numpy as np
 import pytest
+from glsk_studies import large, rates, speed, stopwatch
 
 from glsk_o3d import Skeleton, pipelines
 from glsk_o3d.geometry.cores import cores
 from glsk_o3d.samples import sauropod
 
-TOOL = "speed"
+STUDY = speed
 
 
 @pytest.fixture
-def call(call, parts, monkeypatch):
+def call(call, monkeypatch):
     """Run a command, small clouds only as often as asked for; gives what it printed."""
-    monkeypatch.setattr(parts.stopwatch, "LEAST", 0.0)
+    monkeypatch.setattr(stopwatch, "LEAST", 0.0)
     return call
 
 
 class TestStopwatch:
-    def test_the_default_pipeline_goes_through_every_stage(self, parts, monkeypatch):
+    def test_the_default_pipeline_goes_through_every_stage(self, monkeypatch):
         points = sauropod(4000, noise=0.01).points
         pipelines.default()(points)  # so that nothing is imported below
         ticks = count()
-        monkeypatch.setattr(parts.stopwatch, "_clocks", lambda: (next(ticks), 0.0))
-        with parts.stopwatch.Stopwatch(parts.stopwatch.STAGES) as watch:
+        monkeypatch.setattr(stopwatch, "_clocks", lambda: (next(ticks), 0.0))
+        with stopwatch.Stopwatch(stopwatch.STAGES) as watch:
             skeleton = pipelines.default()(points)
-        calls = {name: share.calls for name, share in watch.shares.items() if name != parts.stopwatch.REST}
+        calls = {name: share.calls for name, share in watch.shares.items() if name != stopwatch.REST}
         assert min(calls.values()) > 0, calls
         assert calls["Laplacian"] == len(skeleton.report.iterations) == calls["refinement of the solve"]
         assert all(share.cpu > 0 for share in watch.shares.values())
         assert watch.cpu == next(ticks) - 1  # nothing is lost, nothing counts twice
-        shown = [stage for stages, _ in parts.stopwatch.SHARES.values() for stage in stages]
-        assert sorted(shown) == sorted([*parts.stopwatch.STAGES, parts.stopwatch.REST])
+        shown = [stage for stages, _ in stopwatch.SHARES.values() for stage in stages]
+        assert sorted(shown) == sorted([*stopwatch.STAGES, stopwatch.REST])
 
 
 class TestArithmetic:
-    def test_distance_of_curves(self, parts):
+    def test_distance_of_curves(self):
         ends = np.array([[0.0, 0, 0], [10, 0, 0]])
         curve, beside = (Skeleton(ends + [0, y, 0], np.array([[0, 1]]), np.ones(2), (), (), ()) for y in (0, 1))
-        assert parts.large.apart(curve, beside, 20) == pytest.approx((5, 5))
+        assert large.apart(curve, beside, 20) == pytest.approx((5, 5))
         longer = Skeleton(ends * 2, curve.edges, curve.radii, (), (), ())
-        mean, most = parts.large.apart(longer, curve, 20)
+        mean, most = large.apart(longer, curve, 20)
         assert most == pytest.approx(50, abs=0.1)
         assert mean == pytest.approx((100 * 5 / 20 / 2 + 0) / 2, abs=0.1)  # half of it is 5 away on average, back none
 
@@ -72,8 +73,8 @@ class TestCommands:
         for row in rates:
             assert 0 < row["import_wall"] + row["first_wall"] < row["process_wall"]
 
-    def test_stream(self, call, parts, tmp_path, monkeypatch):
-        monkeypatch.setattr(parts.stages, "FRAMES", 3)
+    def test_stream(self, call, tmp_path, monkeypatch):
+        monkeypatch.setattr(rates, "FRAMES", 3)
         page, out = tmp_path / "speed.md", tmp_path / "out.json"
         page.write_text("<!-- stream -->\nold\n<!-- end -->\n")
         call("stream", page, "--sizes", "400", "--scenes", "handles", "--repeat", 1, "-o", out)

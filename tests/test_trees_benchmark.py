@@ -5,29 +5,30 @@ import json
 import numpy as np
 import open3d as o3d
 import pytest
+from glsk_studies import forest, trees
 from scipy.io import savemat
 
 from glsk_o3d import samples
 from glsk_o3d.samples import Sample
 
-TOOL = "trees"
+STUDY = trees
 
 
 class TestClouds:
-    def test_volume_of_two_balls_with_a_cone_between_and_of_overlaps(self, parts):
+    def test_volume_of_two_balls_with_a_cone_between_and_of_overlaps(self):
         capsule = Sample(np.zeros((1, 3)), np.array([[0, 0, 0], [2.0, 0, 0]]), np.array([[0, 1]]), np.ones(2), "one")
         expected = np.pi * (2 + 4 / 3)
-        assert parts.trees.volume(capsule, 400_000) == pytest.approx(expected, rel=0.01)
+        assert forest.volume(capsule, 400_000) == pytest.approx(expected, rel=0.01)
         twice = Sample(capsule.points, capsule.nodes, np.array([[0, 1], [0, 1]]), capsule.radii, "twice")
-        assert parts.trees.volume(twice, 400_000) == pytest.approx(expected, rel=0.01)
+        assert forest.volume(twice, 400_000) == pytest.approx(expected, rel=0.01)
 
 
 class TestScores:
-    def test_half_of_a_line(self, parts):
+    def test_half_of_a_line(self):
         """Its diagonal is 1: all of the half is right, and half of the line is there."""
-        whole = parts.trees.skeleton_of(np.array([[0, 0, 0], [1.0, 0, 0]]), np.array([[0, 1]]))
-        half = parts.trees.skeleton_of(np.array([[0, 0, 0], [0.5, 0, 0]]), np.array([[0, 1]]))
-        found = parts.trees.score(np.array([[0, 0, 0], [1.0, 0, 0]]), whole, half)
+        whole = forest.skeleton_of(np.array([[0, 0, 0], [1.0, 0, 0]]), np.array([[0, 1]]))
+        half = forest.skeleton_of(np.array([[0, 0, 0], [0.5, 0, 0]]), np.array([[0, 1]]))
+        found = forest.score(np.array([[0, 0, 0], [1.0, 0, 0]]), whole, half)
         assert found["precision"] == 1
         assert found["recall"] == pytest.approx(0.51, abs=0.003)
         assert found["completeness"] == pytest.approx(100 / 8, rel=0.01)
@@ -67,8 +68,8 @@ class TestModels:
         columns = [[1, 2, 3], START, END, [1, 2, 3], [0, 1, 1], RADIUS, LENGTH, [1, 1, 2]]  # R numbers its rows
         return written(path, names, columns)
 
-    def test_measures_are_those_of_the_cylinders(self, parts, model):
-        found = parts.trees.read_cylinder_model(model)
+    def test_measures_are_those_of_the_cylinders(self, model):
+        found = forest.read_cylinder_model(model)
         assert found.height == pytest.approx(4)
         assert found.stem_diameter == pytest.approx(0.4)
         assert found.volume == pytest.approx(np.pi * (0.04 * 2 + 0.0225 * 2 + 0.01 * 2.5))
@@ -94,13 +95,13 @@ class TestCommands:
         assert all(abs(row["volume"]) < 0.05 for row in rows)
         assert "clean: stem diameter" in out
 
-    def test_stems(self, call, parts, tmp_path):
+    def test_stems(self, call, tmp_path):
         out = call("stems", "--trees", 1, "--jobs", 0, "-o", tmp_path / "s.json")
         rows = json.loads((tmp_path / "s.json").read_text())["rows"]
         assert [(row["seeds"], row["tree"]) for row in rows] == [("chosen", 0), ("other", 100)]
         assert all(abs(row["stem_diameter"] / row["true_diameter"] - 1) < 0.03 for row in rows)
         assert "other seeds, all" in out
-        (_, _, (line, *_)), (_, header, (*_, last)) = parts.trees.stem_tables([rows[0], rows[1] | dict(failure="no")])
+        (_, _, (line, *_)), (_, header, (*_, last)) = forest.stem_tables([rows[0], rows[1] | dict(failure="no")])
         assert line[1:3] == ["1", "1"]
         assert len(last) == len(header)
         assert last[-1] == "no"

@@ -1,8 +1,14 @@
-"""The pages of the API reference: one per task, one per public name: from the stubs, ``__all__`` and the modules."""
+"""The pages of the API reference, one per task and one per public name, and the links in docstrings.
+
+A Sphinx extension; the tests read its lists without Sphinx.
+"""
 
 import importlib
 import inspect
+import re
 from pathlib import Path
+
+GENERATED = Path(__file__).resolve().parents[1] / "generated"
 
 TASKS = {
     "skeletons": ("From a cloud to its skeleton", "glsk_o3d"),
@@ -11,24 +17,24 @@ TASKS = {
     "named_pipelines": ("Named pipelines", "glsk_o3d.pipelines"),
     "recipes": ("Pipelines as files", "glsk_o3d"),
     "io": ("Reading and writing", "glsk_o3d"),
-    "viewing": ("Looking", "glsk_o3d"),
+    "viewing": ("Pictures", "glsk_o3d"),
     "analysis": ("Analysis", "glsk_o3d.analysis"),
-    "editing": ("After the skeleton", "glsk_o3d.editing"),
+    "editing": ("Edits of a skeleton", "glsk_o3d.editing"),
     "batch": ("Many clouds", "glsk_o3d.apps.batch"),
     "crosscheck": ("Cross-check with a mesh", "glsk_o3d.apps.crosscheck"),
     "samples": ("Sample clouds", "glsk_o3d.samples"),
     "benchmark": ("The benchmark", "glsk_bench"),
     "benchmark_shapes": ("Shapes of the benchmark", "glsk_bench.shapes"),
     "benchmark_clouds": ("Clouds of the benchmark", "glsk_bench.clouds"),
-    "meshlab": ("In MeshLab's way", "glsk_o3d"),
+    "meshlab": ("MeshLab", "glsk_o3d"),
     "errors": ("Errors and warnings", "glsk_o3d"),
 }
-"""The pages, in the order of the menu: what they are for, and the package that users import from."""
+"""The pages, in the order of the menu: their purpose, and the package that users import from."""
 NAMES = {
     "skeletons": {
         "One call": ("skeletonize", "Skeleton"),
-        "How far it hangs on chance": ("support", "Supported"),
-        "What it says about itself": ("Report", "IterationRecord", "Decision"),
+        "Which parts depend on single points": ("support", "Supported"),
+        "The record of a run": ("Report", "IterationRecord", "Decision"),
         "Fewer points, without a skeleton": ("remove_redundant_points",),
     },
     "filters": {
@@ -40,10 +46,10 @@ NAMES = {
     },
     "pipelines": {
         "Joining filters": ("Pipeline", "Filter"),
-        "What runs through them": ("Cloud", "Points", "Contraction"),
+        "Their data": ("Cloud", "Points", "Contraction"),
     },
     "named_pipelines": {
-        "To work with": ("default", "tree"),
+        "For general use": ("default", "tree"),
         "The first half": ("rings",),
         "As they were published": ("wen2024", "cao2010"),
     },
@@ -51,7 +57,7 @@ NAMES = {
         "Writing and reading": ("save_recipe", "load_recipe", "to_recipe", "from_recipe"),
     },
     "io": {
-        "As Open3D's and pymeshlab's": ("to_line_set", "to_tubes", "to_pymeshlab", "annotate"),
+        "As objects of Open3D and pymeshlab": ("to_line_set", "to_tubes", "to_pymeshlab", "annotate"),
         "Clouds": ("read_cloud", "read_tensor_cloud", "read_sample", "annotate_file"),
         "Skeletons": ("read_skeleton", "save_skeleton", "read_truth"),
         "For other programs": ("save_rig",),
@@ -63,23 +69,23 @@ NAMES = {
         "Branches": ("branch_table", "BranchTable", "segment"),
         "Trees": ("tree_measures", "TreeMeasures", "cylinders", "Cylinders"),
         "Grasps": ("grasp_candidates", "GraspCandidates", "Gripper"),
-        "How good is it?": ("assess", "Assessment"),
-        "How far is it from a known axis?": ("compare", "Comparison", "Truth"),
+        "Measures without a truth": ("assess", "Assessment"),
+        "Measures against a known axis": ("compare", "Comparison", "Truth"),
     },
     "editing": {
-        "Leave out": ("prune", "largest_component", "cut_loops"),
+        "Removal of parts": ("prune", "largest_component", "cut_loops"),
         "Fewer vertices": ("simplify",),
         "More or less detail": ("detailed",),
         "Another root": ("reroot",),
     },
     "batch": {
         "Running": ("run_batch", "BatchResult"),
-        "Looking before": ("plan_batch", "Plan"),
-        "As they come": ("Skeletonizer",),
+        "Plans": ("plan_batch", "Plan"),
+        "Streams": ("Skeletonizer",),
     },
     "crosscheck": {"The check": ("cross_check", "CrossCheck")},
     "samples": {
-        "By name, and what they hold": ("sample_object", "Sample"),
+        "By name": ("sample_object", "Sample"),
         "With limbs": ("sauropod", "tree", "y_junction"),
         "Tubes and rings": ("tube", "helix", "torus", "two_rings"),
         "Without an axis": ("sphere", "sheet"),
@@ -92,47 +98,38 @@ NAMES = {
         "Scores": ("score", "Scores", "score_answers", "Results", "read_results", "leaderboard", "Leaderboard"),
         "Repeated": ("sample", "repeat", "Repeat", "spread"),
     },
-    "benchmark_shapes": {"Drawing one": ("shape", "Shape", "Thing")},
-    "benchmark_clouds": {"Drawing one": ("cloud",), "How much it shows": ("coverage",)},
+    "benchmark_shapes": {"One draw": ("shape", "Shape", "Thing")},
+    "benchmark_clouds": {"One draw": ("cloud",), "The visible share of the axis": ("coverage",)},
     "meshlab": {"A session": ("MeshSet",)},
     "errors": {
         "All errors": ("GlskError",),
         "Wrong input": ("InvalidCloudError", "InvalidParameterError", "FileFormatError", "RecipeError", "ScriptError"),
-        "What went wrong later": ("StageError", "BatchError", "DisplayError", "MissingPackageError"),
+        "Errors during a run": ("StageError", "BatchError", "DisplayError", "MissingPackageError"),
         "Warnings": ("SkeletonWarning", "PluginWarning"),
     },
 }
-"""The names on each page, by what they are for."""
+"""The names on each page, by purpose."""
 PACKAGES = tuple(dict.fromkeys(module for _, module in TASKS.values()))
-"""What users import from."""
+"""The packages that users import from."""
 MODULES = {
     "glsk_o3d.parameters": "Making filters",
-    "glsk_o3d.interop.clouds": "What counts as a cloud",
-    "glsk_o3d.recipes.catalogue": "What there is by name",
+    "glsk_o3d.interop.clouds": "Clouds",
+    "glsk_o3d.recipes.catalogue": "Filters and pipelines by name",
     "glsk_o3d.recipes.plugins": "Plugins",
 }
-"""What the package's own parts, and those who extend it, import from."""
+"""The modules that plugins import from."""
 
 
 def names(module):
-    """The public functions and classes of a module: those that have a task, or else all that it defines.
-
-    Parameters
-    ----------
-    module : str
-
-    Returns
-    -------
-    list of str
-    """
+    """The public functions and classes of a module: those with a task, or else all that it defines."""
     if module in PACKAGES:
         pages = [page for page, (_, package) in TASKS.items() if package == module]
-        return [name for page in pages for told in NAMES[page].values() for name in told]
-    return found(module)
+        return [name for page in pages for group in NAMES[page].values() for name in group]
+    return defined(module)
 
 
-def found(module):
-    """The names in ``__all__``, or else those of all that the module defines, in its order."""
+def defined(module):
+    """The names in ``__all__``, or else those of the functions and classes that the module defines, in its order."""
     loaded = importlib.import_module(module)
     own = [name for name, thing in vars(loaded).items() if getattr(thing, "__module__", None) == module]
     public = getattr(loaded, "__all__", [name for name in own if not name.startswith("_")])
@@ -155,13 +152,13 @@ def menu(pages):
 
 
 def task_pages():
-    """A page per task, and one for what the package's own parts import."""
+    """A page per task, and one for plugins."""
     for page, (title, module) in TASKS.items():
         lines = [*heading(title, "="), *((f".. automodule:: {module}", "") if module != "glsk_o3d" else ())]
-        for task, told in NAMES[page].items():
-            lines += [*heading(task, "-"), *listed(module, told)]
-        yield page, [*lines, *menu(f"{module}.{name}" for told in NAMES[page].values() for name in told)]
-    lines = [*heading("For those who extend it", "="), "What the package's own parts use, and plugins may.", ""]
+        for task, group in NAMES[page].items():
+            lines += [*heading(task, "-"), *listed(module, group)]
+        yield page, [*lines, *menu(f"{module}.{name}" for group in NAMES[page].values() for name in group)]
+    lines = [*heading("For those who extend it", "="), "Plugins may use these parts of the package, too.", ""]
     for module, title in MODULES.items():
         lines += [*heading(title, "-"), f".. automodule:: {module}", "", *listed(module, own(module))]
     yield "extending", [*lines, *menu(f"{module}.{name}" for module in MODULES for name in own(module))]
@@ -189,7 +186,7 @@ def overview():
     """The first page: everything, by task."""
     lines = [
         *heading("API reference", "="),
-        "Every public name, by what it is for.",
+        "Every public name, by purpose.",
         "",
         ".. automodule:: glsk_o3d",
         "",
@@ -197,7 +194,7 @@ def overview():
     for page, (title, module) in TASKS.items():
         link = f":doc:`{title} <{page}>`"
         lines += [*heading(link, "-"), f"``{module}``", ""]
-        lines += listed(module, [name for told in NAMES[page].values() for name in told])
+        lines += listed(module, [name for group in NAMES[page].values() for name in group])
     lines += [*heading(":doc:`For those who extend it <extending>`", "-")]
     lines += [*(f"- ``{module}``: {title.lower()}" for module, title in MODULES.items()), ""]
     return [*lines, *menu([*TASKS, "extending"])]
@@ -212,5 +209,22 @@ def write(folder: Path) -> None:
         old.unlink()
     for name, text in pages.items():
         page = folder / f"{name}.rst"
-        if not page.exists() or page.read_text() != text:  # what has not changed is not read again
+        if not page.exists() or page.read_text() != text:  # Sphinx reads only changed pages again
             page.write_text(text)
+
+
+def stay_text(app, env, node, contnode):
+    """A parameter in single backticks has no page: it stays text."""
+    return contnode if node["reftype"] == "obj" and "." not in node["reftarget"] else None
+
+
+def link_pages(app, what, name, thing, options, lines):
+    """The path of a page in a docstring becomes a link."""
+    lines[:] = [re.sub(r"docs/((?:filters/)?\w+)\.md", r":doc:`/docs/\1`", line) for line in lines]
+
+
+def setup(app):
+    app.connect("config-inited", lambda app, config: write(GENERATED))
+    app.connect("autodoc-process-docstring", link_pages)
+    app.connect("missing-reference", stay_text)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,4 +1,4 @@
-"""The rooms of the house and who may import whom: drawn for the architecture page, and tested."""
+"""The parts of the package and who may import whom: drawn for the page on the architecture, and tested."""
 
 import ast
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The numbers that steer the skeleton of a cloud: constants and defaults, where each comes from; a table of them."""
+"""The numbers that steer the skeleton of a cloud: constants, weights and defaults, and where each comes from."""
 
 import ast
 import dataclasses
@@ -14,8 +14,8 @@ FILES = (
     "data/decisions",
 )
 ORIGINS = ("published", "derived", "measured", "fitted", "speed", "precision", "warning")
-"""Where numbers come from. Those for speed, such as the sizes of blocks, change no result, those of precision none when
-they are finer, and those of warnings only what is said about one."""
+"""Where numbers come from. Those for speed, such as the sizes of blocks, change no result; those of precision change
+none if they are finer; those of warnings change only warnings."""
 ORIGIN = re.compile(rf"\b({'|'.join(ORIGINS)})\b", re.IGNORECASE)
 
 
@@ -32,7 +32,7 @@ class Number:
 
     @property
     def steers(self):
-        """Whether another value would give another skeleton, and it was chosen: neither derived nor for speed alone."""
+        """Whether the number was chosen, and another value would give another skeleton."""
         return self.origin in ("published", "measured", "fitted")
 
 
@@ -68,13 +68,13 @@ def comments(lines, statement):
     return [*lines[top:group], *lines[own:first], lines[end - 1].partition("#")[2]]
 
 
-def origin(said):
-    """Where a number comes from by its comments, the nearest first; None if they do not say it."""
-    return next((found[1].lower() for line in reversed(said) if (found := ORIGIN.search(line))), None)
+def origin(lines):
+    """Where a number comes from by its comments, the nearest first; None if they do not name it."""
+    return next((match[1].lower() for line in reversed(lines) if (match := ORIGIN.search(line))), None)
 
 
 def files():
-    """The modules that are asked, those of the filters first."""
+    """The modules with such numbers, those of the filters first."""
     return [
         *(PACKAGE / f"{name}.py" for name in FILES),
         *(p for room in ROOMS for p in sorted((PACKAGE / room).rglob("*.py"))),
@@ -82,21 +82,21 @@ def files():
 
 
 def all_constants():
-    """Every constant of the filters and of what they call, as a list of Number."""
-    found = []
+    """Every constant of the filters and of the modules that they call, as a list of Number."""
+    numbers = []
     for path in files():
         text = path.read_text(encoding="utf-8")
         for name, statement in constants(ast.parse(text)):
             if is_number(statement.value):
-                said = comments(text.splitlines(), statement)
-                what = " ".join(line.strip(" #") for line in said).strip()
+                lines = comments(text.splitlines(), statement)
+                what = " ".join(line.strip(" #") for line in lines).strip()
                 place = path.relative_to(PACKAGE).with_suffix("").as_posix()
-                found.append(Number(place, name, value_of(name, statement), origin(said) or "", what))
-    return found
+                numbers.append(Number(place, name, value_of(name, statement), origin(lines) or "", what))
+    return numbers
 
 
 def value_of(name, statement):
-    """What one of the names of a statement is assigned, as it is written."""
+    """The value that a statement assigns to one of its names, as it is written."""
     target = statement.targets[0] if isinstance(statement, ast.Assign) else statement.target
     if isinstance(target, ast.Tuple) and isinstance(statement.value, ast.Tuple):
         return ast.unparse(statement.value.elts[[node.id for node in target.elts].index(name)])
@@ -115,7 +115,7 @@ def weights():
     return found
 
 
-EVEN = ("handle", "air", "bridge", "limb")
+THRESHOLDS = ("handle", "air", "bridge", "limb")
 """Options that are probabilities."""
 
 
@@ -124,21 +124,23 @@ def defaults():
     from glsk_o3d import pipelines
     from glsk_o3d.pipeline import parts
 
-    theirs = {(type(part), field): value for part in parts(pipelines.wen2024()) for field, value in vars(part).items()}
+    published = {
+        (type(part), field): value for part in parts(pipelines.wen2024()) for field, value in vars(part).items()
+    }
     found = []
     for part in parts(pipelines.default()):
         for field in dataclasses.fields(part):
             value = getattr(part, field.name)
             if re.fullmatch(r"[\d.e+-]+%?", str(value)) and type(value) is not bool:
-                where = "published" if theirs.get((type(part), field.name)) == value else "fitted"
-                if field.name in EVEN and value == 0.5:
+                where = "published" if published.get((type(part), field.name)) == value else "fitted"
+                if field.name in THRESHOLDS and value == 0.5:
                     where = "derived"  # where both answers are equally likely
                 found.append(Number(type(part).__name__, field.name, str(value), where, field.metadata["doc"]))
     return found
 
 
 def steering():
-    """All that steer, as a list of Number."""
+    """All numbers that steer, as a list of Number."""
     return [number for number in [*defaults(), *weights(), *all_constants()] if number.steers]
 
 

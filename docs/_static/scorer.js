@@ -8,7 +8,7 @@ var Scorer = {
     if (docname === api + "extending" || /api\/glsk_o3d\.\w+\.\w+\./.test(docname)) return score - 12;
     if (docname.startsWith(api)) return kind === "text" ? score - 4 : score;
     if (docname.startsWith("docs/generated/gallery/")) return score - 2;
-    if (/^(docs\/(architecture|releasing)|CONTRIBUTING|benchmarks|filters)/.test(docname)) return score - 8;
+    if (/^(docs\/(architecture|comparison_tables)|CONTRIBUTING|benchmarks|filters)/.test(docname)) return score - 8;
     return score;
   },
   objNameMatch: 12, // "prune" is glsk_o3d.editing.prune

@@ -2,7 +2,7 @@
 What the filters do
 ===================
 
-The one call is a pipeline of filters. Here each runs by itself, so that you can look at what lies between.
+The one call is a pipeline of filters. Here each runs by itself, so that you can look at the results between them.
 """
 
 import matplotlib.pyplot as plt
@@ -14,11 +14,11 @@ from glsk_o3d.samples import sauropod
 cloud = sauropod(4096, noise=0.002).points
 
 # %%
-# **Preparation**: a scan of any size becomes points without outliers, noise and more of them than it takes. **Rings**:
-# which neighbours surround each point. **Contraction**: the rings' Laplacian draws the points inwards,
-# while local point reduction (**LPR**) merges those of a large cloud that say little more than their neighbours.
-# **Connection**: clusters of contracted points become a graph. **Refinement**: the graph becomes a curve in the middle
-# of the surface. **Tracing** is for twigs that show no surface; here it finds nothing to do.
+# **Preparation**: outliers, noise and surplus points of a scan are removed. **Rings**: the neighbours around each
+# point. **Contraction**: the Laplacian of the rings draws the points inwards, while local point reduction (**LPR**)
+# merges redundant points of a large cloud. **Connection**: clusters of contracted points become a graph.
+# **Refinement**: the graph becomes a curve in the middle of the surface. **Tracing** is for twigs that show no surface;
+# here it finds nothing to do.
 
 prepared = (glsk.Sampler() | glsk.OutlierRemover() | glsk.Denoiser() | glsk.Thinner())(cloud)
 rings = glsk.RingBuilder()(prepared)
@@ -45,7 +45,7 @@ for place, (title, (drawn, points)) in enumerate(panels.items(), start=1):
 plt.show()
 
 # %%
-# LPR also runs alone. One pass after one solve leaves the points that matter, where they were:
+# LPR also runs alone. One pass after one solve leaves the points that are not redundant, at their old places:
 
 once = glsk.Contractor(max_iterations=1)(rings)
 reduced = glsk.LPRReducer()(once)

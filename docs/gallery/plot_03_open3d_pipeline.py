@@ -34,7 +34,7 @@ scene.points = o3d.utility.Vector3dVector(
 )
 
 # %%
-# Open3D's part. ``cluster_dbscan`` gives single outliers the label -1.
+# Open3D finds the objects. ``cluster_dbscan`` gives single outliers the label -1.
 
 o3d.utility.random.seed(0)
 scene = scene.voxel_down_sample(0.012)
@@ -48,8 +48,8 @@ clusters = [cluster for cluster in clusters if len(cluster.points) > 300]
 print(f"table {plane.round(2)}, {len(clusters)} objects")
 
 # %%
-# Ours: ``skeletonize`` takes the cloud as it is. ``annotate`` gives a copy of it whose points know branch and radius;
-# line sets and tubes are what ``o3d.visualization.draw_geometries`` draws.
+# ``skeletonize`` takes each cloud as it is. ``annotate`` returns a copy with branch and radius of every point.
+# ``o3d.visualization.draw_geometries`` draws line sets and tubes.
 
 skeletons = [glsk.skeletonize(cluster) for cluster in clusters]
 for cluster, skeleton in zip(clusters, skeletons, strict=True):

@@ -1,10 +1,12 @@
 """
-Is the skeleton right? A mesh says
-==================================
+Cross-check with a mesh
+=======================
 
-Everything starts with the Laplacian of the rings. So make a mesh with vertices of its own, let libigl compute the
-Laplacian of that, contract it, too, and see where the two ways differ. No truth is needed.
+The contraction depends on the Laplacian of the rings. A mesh with vertices of its own gives a second Laplacian, by
+libigl, and a second skeleton. The check compares both. No truth is needed.
 """
+
+# sphinx_gallery_thumbnail_number = 2
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -48,7 +50,7 @@ show(check)
 plt.show()
 
 # %%
-# The solid says how many parts and loops a skeleton must have. One convention to know when you compare yourself: the
+# The parts and handles of the solid are the parts and loops that a skeleton must have. For comparisons of your own: the
 # rows of the contraction are L = 2 igl.cotmatrix; they sum to zero, and L P points inwards. `check.ours` and
 # `check.theirs` have the halves.
 

@@ -31,23 +31,22 @@ clouds = {
 }
 
 # %%
-# Compare the titles. Strays hardly matter, noise moves the curve a little. Where a tenth of the points is left the
-# handle is too thin to be told from strays, and its loop is gone. What one camera did not see is missing, parts come
-# apart, and where a side is missing the curve may leave the middle; a second camera mends most of that.
+# Compare the titles. Outliers hardly matter, and noise moves the curve a little. With a tenth of the points the handle
+# is too thin to differ from outliers, and its loop is gone. With one camera parts are missing or separate, and the
+# curve may leave the middle; a second camera repairs most of that.
 
 figure = plt.figure(figsize=(12, 6.5), layout="constrained")
 for place, (name, cloud) in enumerate(clouds.items(), start=1):
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         skeleton = glsk.skeletonize(cloud)
     found = compare(skeleton, truth)
     title = f"{name}\nerror {found.error:.2f}, complete {found.completeness:.0%}, loops {skeleton.n_loops}"
     axes = figure.add_subplot(2, 3, place, projection="3d")
     glsk.plot_skeleton(skeleton, axes, color="confidence").set_title(title, fontsize=10)
-    for warning in told:
+    for warning in caught:
         print(f"{name}: {warning.message}")
 plt.show()
 
 # %%
-# Colours are the confidence, from dark blue (0) to yellow (1): the curve knows where its points hardly say where the
-# axis is.
+# Colours are the confidence, from dark blue (0) to yellow (1). It is low where the points hardly determine the axis.

@@ -2,7 +2,7 @@
 Every branch in numbers
 =======================
 
-Length, thickness, angle and order of every branch: what one measures on plants, vessels and cave systems.
+Length, thickness, angle and order of every branch are measured on plants, vessels and cave systems.
 """
 
 import matplotlib.pyplot as plt
@@ -34,7 +34,7 @@ grow(0, np.array([0.0, 0, 1]), np.array([1.0, 0, 0]), 1.0, 0.1, 3)
 nodes, edges, radii = np.array(nodes), np.array(edges), np.array(radii)
 
 # %%
-# The cloud: a tube of the samples for each branch, turned into its place, without what lies inside another.
+# The cloud: a tube of the samples for each branch, turned into its place, without points inside another branch.
 
 parts = []
 for number, (start, end) in enumerate(edges):
@@ -69,8 +69,8 @@ for order in range(table.level.max() + 1):
     )
 
 # %%
-# The first three orders come out within a few per cent. The tips come out too short, and their angles with them: the
-# end of a curve is where its points say least about it, and near a fork the parts blend.
+# The first three orders are right within a few per cent. The tips are too short, and their angles are off: the points
+# determine the end of a curve least, and near a fork the parts blend.
 
 figure = plt.figure(figsize=(10, 6), layout="constrained")
 left, right = (figure.add_subplot(1, 2, place, projection="3d") for place in (1, 2))

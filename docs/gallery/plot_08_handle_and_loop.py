@@ -17,9 +17,9 @@ rings = glsk.pipelines.rings()(cloud)
 graph = (glsk.Contractor() | glsk.Connector())(rings)
 
 # %%
-# The raw graph is full of small loops. Those of three edges are no loops but triangles, and the refinement closes
-# as published. Larger ones are left. The recommended refinement asks of each how probable it is that it is a handle,
-# and closes the others.
+# The raw graph is full of small loops. Those of three edges are triangles, and the published refinement collapses only
+# these. The recommended refinement computes for each larger loop the probability that it is a handle, and closes the
+# others.
 
 published = glsk.Refiner(handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)(graph)
 skeleton = glsk.Refiner()(graph)
@@ -31,7 +31,7 @@ for name, each in (
     print(f"{name:17} {each.n_loops:4} loops")
 
 # %%
-# What was asked, and how it was answered, is in the report; here the loops.
+# The report has all questions and answers; these are the loops.
 
 for it in skeleton.report.decisions:
     if it.about == "loop":

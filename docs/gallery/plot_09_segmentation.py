@@ -2,7 +2,7 @@
 A cloud cut into its limbs
 ==========================
 
-Every point belongs to a vertex, every vertex to a branch: so a skeleton divides its cloud into parts.
+Every point belongs to a vertex, and every vertex to a branch, so a skeleton divides its cloud into parts.
 """
 
 import matplotlib.pyplot as plt
@@ -35,7 +35,7 @@ glsk.plot_skeleton(skeleton, cloud=scan, color=(0.1, 0.1, 0.1), point_colors=col
 plt.show()
 
 # %%
-# One part by itself is a mask away, and is a cloud like any other.
+# A mask selects one part, which is a cloud like any other.
 
 longest = scan[label == table.length.argmax()]
 print(f"the longest branch: {len(longest)} points, {np.ptp(longest, axis=0).round(2)} large")

@@ -16,8 +16,8 @@ import glsk_o3d as glsk
 from glsk_o3d.samples import sample_object
 
 # %%
-# ``on_state`` tells where each point is after each solve; every second is followed here. A point that was merged into
-# another stands where that stands.
+# ``on_state`` gets the place of each point after each solve; every second point is drawn here. A merged point has the
+# place of its representative.
 
 cloud = sample_object(8192).points
 positions = [cloud[::2]]
@@ -32,9 +32,9 @@ solves = len(positions) - 1
 print(f"{solves} solves: {skeleton.report.stop_reason}")
 
 # %%
-# Thin parts are lines after a solve or two; the later ones draw the trunk together. It is no line even in the end:
-# the rule stops when another solve would hardly change the whole. The skeleton (red) lies where the surface has its
-# middle, and need not run through the contracted points.
+# Thin parts are lines after a solve or two; later solves draw the trunk together. It is no line even in the end: the
+# rule stops when another solve would hardly change the whole. The skeleton (red) lies in the middle of the surface, and
+# need not run through the contracted points.
 
 figure = plt.figure(figsize=(12, 6), layout="constrained")
 columns = (solves + 3) // 2

@@ -43,4 +43,4 @@ for row, (pipeline, name) in enumerate(names.items()):
 plt.show()
 
 # %%
-# Three clouds prove nothing; the tables over all shapes and variants are on the page about accuracy.
+# Three clouds prove nothing; the page on measures has tables over all shapes and variants.

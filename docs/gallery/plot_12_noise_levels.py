@@ -37,4 +37,4 @@ for row, pipeline in enumerate(("cao2010", "wen2024", "default")):
 plt.show()
 
 # %%
-# True are one loop and six ends.
+# The object has one loop and six ends.

@@ -2,7 +2,7 @@
 Many scans at once, with Dask
 =============================
 
-Many scans, a cluster, a ledger: what is done is not done again, and one bad file does not stop the others. It needs the
+Many scans, a cluster, a ledger: finished scans are skipped, and one bad file does not stop the others. It needs the
 extra ``cluster``.
 """
 
@@ -57,7 +57,7 @@ for name, row in first.rows.items():
     print(f"{name:10} {row['status']:6} {row['seconds']:6.2f} s  {facts}")
 
 # %%
-# And here is what is in the folder of results.
+# The folder of results.
 
 figure = plt.figure(figsize=(10, 6.5), layout="constrained")
 done = [row for row in first.rows.values() if row["status"] == "done"]

@@ -2,9 +2,11 @@
 Where a gripper takes a mug
 ===========================
 
-What a robot does with two depth images: find the table and the mug on it, the mug's skeleton, and where its gripper can
-take the mug without touching anything else.
+From two depth images: the table and the mug on it, the mug's skeleton, and places where a gripper can take the mug
+without touching anything else.
 """
+
+# sphinx_gallery_thumbnail_number = 2
 
 import warnings
 from pathlib import Path
@@ -63,8 +65,8 @@ for axis, eye in zip(axes, ([0.28, -0.38, 0.32], [0.15, 0.42, 0.34]), strict=Tru
 plt.show()
 
 # %%
-# The largest plane is the table, and the largest thing on it is the mug. Its skeleton has a loop, the handle. That the
-# rest, round and hollow, has no axis to speak of is told in the report, and by the confidence.
+# The largest plane is the table, and the largest object on it is the mug. Its skeleton has a loop, the handle. The rest
+# is round and hollow and has no axis: the report and the confidence show this.
 
 cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.concatenate(clouds)))
 o3d.utility.random.seed(0)
@@ -79,7 +81,7 @@ print(skeleton, *skeleton.report.warnings, sep="\n")
 
 # %%
 # The gripper opens 80 mm and is otherwise like a Franka Hand. It may come from above and from the sides, not from below
-# the table, which is solid behind its plane. Whatever the fingers or the palm would sweep over on the way in counts.
+# the table, which is solid behind its plane. The whole volume that fingers and palm sweep on their way in must be free.
 
 gripper = Gripper(max_opening=0.08)
 options = dict(around=12, spacing=0.006, clearance=0.006)

@@ -13,7 +13,7 @@ import glsk_o3d as glsk
 from glsk_o3d import samples
 
 # %%
-# A tree in metres. Points are as far apart everywhere: many around the trunk, but twigs are thinner than that.
+# A tree in metres. The points are evenly spaced: many lie around the trunk, but twigs are thinner than the spacing.
 
 cloud = samples.tree(4096, forks=6, seed=4).points
 print(f"{len(cloud)} points, {2**6} tips")
@@ -35,7 +35,7 @@ print(
 )
 
 # %%
-# What foresters read. The radius of a traced twig is the scatter of its points: it knows no better.
+# The measures for foresters. The radius of a traced twig is the scatter of its points.
 
 measures = glsk.analysis.tree_measures(tree)
 print(f"height {measures.height:.2f} m, diameter at 1.3 m {measures.stem_diameter:.3f} m")

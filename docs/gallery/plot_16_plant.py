@@ -2,7 +2,7 @@
 Stem and leaves of a plant
 ==========================
 
-Where leaves leave the stem, at which angle, how long they are: a young maize plant, as phenotyping measures it.
+Place, angle and length of the leaves of a young maize plant, as phenotyping measures them.
 """
 
 import warnings
@@ -68,7 +68,7 @@ for row, height, length in zip(leaves, HEIGHTS, LENGTHS, strict=True):
 
 # %%
 # Lengths are good to 2 %, heights to a centimetre; the angle is that of the leaf's first few centimetres, in which it
-# has begun to bend. What no skeleton tells is how wide a leaf is. The rooted plant goes on as SWC, a list of nodes and
+# has begun to bend. No skeleton has the width of a leaf. The rooted plant is saved as SWC, a list of nodes and
 # their parents; ``table.to_csv("leaves.csv")`` has the measures.
 
 with TemporaryDirectory() as folder:

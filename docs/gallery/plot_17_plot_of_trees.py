@@ -17,7 +17,7 @@ import glsk_o3d as glsk
 from glsk_o3d import samples
 
 # %%
-# What the scanner left, here made from two trees seen by a lidar from three places with 5 mm of noise, and written by
+# The scan: two trees seen by a lidar from three places with 5 mm of noise, written by
 # laspy in millimetres with the coordinates of a map. Class 2 is ground, 5 high vegetation; ``treeID`` is a
 # segmentation's.
 
@@ -55,7 +55,7 @@ tree = glsk.pipelines.tree(root="z")(cloud)
 print(tree)
 
 # %%
-# Volume and stem diameter, against what this tree was made with.
+# Volume and stem diameter, against the true ones.
 
 measures = glsk.analysis.tree_measures(tree)
 truth = trees[0]

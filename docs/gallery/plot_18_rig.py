@@ -38,8 +38,8 @@ glsk.save_rig(skeleton, path, mesh, cut_loops=True)
 print(f"{path.stat().st_size // 1024} kB")
 
 # %%
-# What a glTF library makes of it: joints, and for every vertex of the mesh the few that move it. Blender shows the
-# same, with the bones called after their branches.
+# A glTF library reads joints, and for every vertex of the mesh the few joints that move it. Blender shows the same,
+# with the bones named after their branches.
 
 file = pygltflib.GLTF2().load(str(path))
 

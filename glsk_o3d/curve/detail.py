@@ -3,7 +3,7 @@
 import heapq
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import takewhile
 from typing import NamedTuple
 
@@ -13,15 +13,24 @@ from scipy.spatial import cKDTree
 from ..data.decisions import Decision
 from ..data.graph import OF_VERTICES
 from ..data.skeleton import Skeleton
+from ..geometry.numbers import derived, speed
 from ..geometry.pairing import final_representatives
 from ..geometry.paths import maximal_paths
 from ..geometry.polylines import arc_lengths
 from ..geometry.vectors import TINY, norm
 from .topology.spurs import limb_candidate
 
-MOST_MOVED = 2.0  # derived: radii that an end, or all of its branch, or a junction moves while the skeleton is refined
-EVEN = 0.5  # derived: probability from which something is more likely than not
-NEAREST_TIPS = 8  # speed: of which a decision may be about one
+
+@dataclass(frozen=True)
+class DetailNumbers:
+    """Numbers of `with_limbs`."""
+
+    moved: float = derived(2.0, "radii that an end or a junction moves while the curve is refined")
+    even: float = derived(0.5, "probability from which something is more likely than not")
+    tips: int = speed(8, "tips of which a decision may be about one")
+
+
+DETAIL = DetailNumbers()
 
 
 class Limbs(NamedTuple):
@@ -47,7 +56,7 @@ def all_limbs(skeleton: Skeleton) -> Limbs:
         places = np.array(limb.branch)
         away = np.where(inner, norm(vertices - places[0]) / np.fmax(radii, TINY), np.inf)
         junction = int(away.argmin())
-        if away[junction] <= MOST_MOVED:
+        if away[junction] <= DETAIL.moved:
             path = np.r_[junction, len(vertices) + np.arange(len(places) - 1)]
             edges.append(np.column_stack([path[:-1], path[1:]]))
             vertices, radii = np.concatenate([vertices, places[1:]]), np.r_[radii, limb.radii[1:]]
@@ -82,7 +91,7 @@ def pruning_order(limbs: Limbs) -> Iterator[tuple[Decision, float, list[int]]]:
             continue
         yield limbs.judged[tip], chance[tip], path
         at[junction].remove(number)
-        if chance[tip] > EVEN:  # others were mostly gone when the rest was judged
+        if chance[tip] > DETAIL.even:  # others were mostly gone when the rest was judged
             none[junction] *= 1 - chance[tip]
         if len(at[junction]) == 2 and at[junction][0] != at[junction][1]:
             one, other = at.pop(junction)
@@ -151,13 +160,13 @@ def _judged_ends(skeleton: Skeleton) -> dict[int, Decision]:
         path = path if skeleton.degree[path[-1]] == 1 else path[::-1]
         if skeleton.degree[path[-1]] == 1 and skeleton.degree[path[0]] > 2:
             tip, length = int(path[-1]), float(arc_lengths(skeleton.vertices[path])[-1])
-            reach[tip] = max(MOST_MOVED * float(skeleton.radii[tip]), length)
+            reach[tip] = max(DETAIL.moved * float(skeleton.radii[tip]), length)
     if root := skeleton.report.root:
         reach.pop(int(norm(skeleton.vertices - root).argmin()), None)
     if not kept or not reach:
         return {}
     tips = list(reach)
-    near = min(NEAREST_TIPS, len(tips))
+    near = min(DETAIL.tips, len(tips))
     distance, nearest = cKDTree(skeleton.vertices[tips]).query([it.place for it in kept], range(1, near + 1))
     found: dict[int, Decision] = {}
     free = set(range(len(kept)))

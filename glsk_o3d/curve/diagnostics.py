@@ -1,21 +1,30 @@
 """Warnings about places without a meaningful curve skeleton: sheets, balls, and points that do not determine it."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..data.decisions import coordinates
 from ..geometry.groups import component_labels, group_median, group_sum
+from ..geometry.numbers import warning
 from ..geometry.vectors import dot, norm
 from .curve import Curve
+from .numbers import CURVE
 
-SHEET_SHARE = 0.9  # fitted: share of one direction among the normals around a vertex; a tube has 0.5, half a tube too
-# warning: spread of the normal lines around where they meet, over the radius; a ball has 0, a torus 0.65, a tube 1
-BALL_SPREAD = 0.5
-# measured: length of what is hardly longer than thick, over how thick it is: half its width, or the median distance to
-# the surface; the evenly filled box with the spread of a ball has 2 to 3
-STUB_LENGTH = 3.3
-MAJORITY = 0.5  # derived: of the points, from which on a cloud is called what they are
-LOW_CONFIDENCE = 0.1  # warning: below which a vertex is not to be trusted
-LOW_CONFIDENCE_SHARE = 0.25  # warning: of the points around such vertices that is worth a warning
+
+@dataclass(frozen=True)
+class WarningNumbers:
+    """Numbers of the warnings."""
+
+    ball_spread: float = warning(
+        0.5, "spread of normal lines around where they meet, over the radius: ball 0, torus .65, tube 1"
+    )
+    low_confidence: float = warning(0.1, "confidence below which a vertex is not to be trusted")
+    low_share: float = warning(0.25, "share of the points around such vertices that is worth a warning")
+
+
+WARN = WarningNumbers()
+
 
 REASONS = ("sheet-like", "sphere-like", "no edges", "uncertain topology", "weakly supported")
 """What the messages of `diagnose` begin with."""
@@ -50,11 +59,11 @@ def diagnose(curve: Curve) -> list[str]:
     part, n = curve.component_of_vertex, curve.n_components
     component = part[vertex]
     size = np.bincount(component, minlength=n)[:, None]
-    one_way = np.linalg.eigvalsh(group_sum(along, vertex, len(count)))[:, 2] > SHEET_SHARE * np.maximum(count, 1)
+    one_way = np.linalg.eigvalsh(group_sum(along, vertex, len(count)))[:, 2] > CURVE.sheet * np.maximum(count, 1)
     length = np.bincount(part[curve.edges[:, 0]], curve.edge_lengths, n)
-    stub = length < STUB_LENGTH * group_median(curve.half_width[vertex], component, n)
-    sheet = count[one_way & (~(curve.confidence >= LOW_CONFIDENCE) | stub[part])].sum() / len(vertex)
-    if sheet > MAJORITY:
+    stub = length < CURVE.stub * group_median(curve.half_width[vertex], component, n)
+    sheet = count[one_way & (~(curve.confidence >= WARN.low_confidence) | stub[part])].sum() / len(vertex)
+    if sheet > CURVE.majority:
         return [
             f"sheet-like: around {sheet:.0%} of the points the surface faces one direction only, "
             "so a curve skeleton has little meaning; if that is a table or a floor under an object, remove it first, "
@@ -70,9 +79,9 @@ def diagnose(curve: Curve) -> list[str]:
     distance = dot(offset, offset)
     miss = distance - dot(normals, offset) ** 2
     spread = group_sum(np.column_stack([miss, distance]), component, n)
-    ball = spread[:, 0] < BALL_SPREAD**2 * spread[:, 1]
+    ball = spread[:, 0] < WARN.ball_spread**2 * spread[:, 1]
     share = size[ball].sum() / len(vertex)
-    if share > MAJORITY:
+    if share > CURVE.majority:
         return [
             f"sphere-like: the normals of parts with {share:.0%} of the points meet in one point, "
             "so no curve skeleton is meaningful there"
@@ -81,8 +90,8 @@ def diagnose(curve: Curve) -> list[str]:
     mean = group_sum(points, component, n) / np.maximum(size, 1)
     length = np.sqrt(12 * np.maximum(np.linalg.eigvalsh(spread - mean[:, :, None] * mean[:, None])[:, 2], 0))
     reach = group_median(norm(cloud.offset), component, n)
-    share = size[length < STUB_LENGTH * reach].sum() / len(vertex)
-    if share > MAJORITY:
+    share = size[length < CURVE.stub * reach].sum() / len(vertex)
+    if share > CURVE.majority:
         return [
             f"sphere-like: parts with {share:.0%} of the points are hardly longer than thick, "
             "so no curve skeleton is meaningful there"
@@ -105,9 +114,9 @@ def _close_calls(curve: Curve) -> list[str]:
 
 
 def _weak_region(curve: Curve, count: np.ndarray) -> list[str]:
-    weak = curve.confidence < LOW_CONFIDENCE
+    weak = curve.confidence < WARN.low_confidence
     share = count[weak].sum() / count.sum()
-    if share <= LOW_CONFIDENCE_SHARE:
+    if share <= WARN.low_share:
         return []
     inner = curve.edges[weak[curve.edges].all(axis=1)]
     label = component_labels(len(weak), inner)

@@ -10,14 +10,8 @@ import numpy as np
 from ..geometry.groups import quantile
 from ..geometry.polylines import arc_lengths, place_at, relative_distance
 from ..geometry.vectors import TINY, dot, norm
-from .axis.fit import FIT_STAY
 from .curve import Curve
-
-# All fitted.
-# distance from the other limbs, over that from them to the surface, where half a limb is undisturbed; and how large a
-# section of a handle is, over the usual one, or how far from its middle a point over the half width, to be its own
-AXIS_LEAVES = 1.3
-AXIS_LENGTH = 2.0  # radii from there, or from where an end is cut, over which its line is taken
+from .numbers import CURVE
 
 
 class Line(NamedTuple):
@@ -88,9 +82,9 @@ class JunctionLimbs:
         if others:
             near = places[: max(np.searchsorted(along, half), 1)]
             ratio, _ = relative_distance(near, self.vertices, self.surface, others)
-            inside = np.flatnonzero(ratio <= AXIS_LEAVES)
+            inside = np.flatnonzero(ratio <= CURVE.undisturbed)
             start = min(along[inside[-1] + 1], half) if len(inside) else start
-        stop = min(start + AXIS_LENGTH * radius, along[-1])
+        stop = min(start + CURVE.line_length * radius, along[-1])
         anchor, back = place_at(places, along, start), place_at(places, along, stop)
         return anchor, (anchor - back) / max(np.linalg.norm(anchor - back), TINY)
 
@@ -101,11 +95,11 @@ class JunctionLimbs:
         was. Returned are, of each limb, its last undisturbed place (k, 3), where it passes the meeting place (k, 3), or
         again its last place if that is behind it, and whether it passes within the radius of the thickest (k,).
         """
-        anchor, way = (np.array(values) for values in zip(*map(self.axis, limbs), strict=True))
+        anchor, direction = (np.array(values) for values in zip(*map(self.axis, limbs), strict=True))
         radius = self.radius[[self.branch[limb] for limb in limbs]]
-        across = np.eye(3) - way[:, :, None] * way[:, None]
-        weight = across.sum(axis=0) + FIT_STAY * np.eye(3)
+        across = np.eye(3) - direction[:, :, None] * direction[:, None]
+        weight = across.sum(axis=0) + CURVE.stay * np.eye(3)
         place = near + np.linalg.solve(weight, np.einsum("kij,kj->i", across, anchor - near))
-        along = dot(place - anchor, way)
-        fits = norm(place - anchor - along[:, None] * way) <= radius.max()
-        return anchor, anchor + np.maximum(along, 0)[:, None] * way, fits
+        along = dot(place - anchor, direction)
+        fits = norm(place - anchor - along[:, None] * direction) <= radius.max()
+        return anchor, anchor + np.maximum(along, 0)[:, None] * direction, fits

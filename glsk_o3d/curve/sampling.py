@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from ..geometry.groups import first_in_their_place, group_rank
 from ..geometry.morton import morton_order
 from .curve import Curve
-from .surface import VERTEX_POINTS
+from .numbers import CURVE
 
 REFINED_POINTS = 16384  # measured: points without noise that a graph is refined by: of 65536 it takes half of the time
 
@@ -30,7 +30,7 @@ def surface_sample(curve: Curve) -> np.ndarray:
     rows = rows[morton_order(curve.points[rows])]
     vertex = curve.vertex_of_point[rows]
     count = np.bincount(vertex, minlength=m)
-    most = max(REFINED_POINTS / clean / np.count_nonzero(count), 2 * VERTEX_POINTS)
+    most = max(REFINED_POINTS / clean / np.count_nonzero(count), 2 * CURVE.vertex_points)
     every = np.ceil(count / most).astype(int)
     return rows[group_rank(vertex, m) % every[vertex] == 0]
 

@@ -20,12 +20,7 @@ from ..geometry.polylines import incident_edges, nearest_on_edges, places_on_edg
 from ..geometry.vectors import TINY, Floats, dot
 from ..geometry.winding import AREA_NEIGHBOURS, orient_from_axis, point_areas, winding_number
 from .curve import Curve
-
-# fitted: winding number below which an axis is in little; .5 on that of a tube seen from one side, .2 in sparse crowns
-LEAST_INSIDE = 0.4
-# measured: points of one object beyond which a surface hangs together in the same way, and noisy ones down to about
-ENOUGH_POINTS = 4096  # which they are averaged
-VERTEX_POINTS = 32  # derived: points to a vertex of a tube with 20 around it, whose vertices are half a radius apart
+from .numbers import CURVE
 
 Thing = TypeVar("Thing")
 Answer = TypeVar("Answer")
@@ -63,7 +58,7 @@ class Surface(Changeable):
     def of(cls, curve: Curve) -> Surface:
         """The surface that supports a curve."""
         supporting = curve.supporting_points
-        enough = max(ENOUGH_POINTS, VERTEX_POINTS * len(curve.vertices))
+        enough = max(CURVE.enough_points, CURVE.vertex_points * len(curve.vertices))
         step = max(len(supporting) // enough, 1)
         if step > 1:  # which they are must not depend on points that have no say
             supporting = np.sort(supporting[morton_order(curve.points[supporting])[::step]])

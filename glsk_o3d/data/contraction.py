@@ -8,7 +8,7 @@ import numpy as np
 from ..geometry.rings import Rings
 from ..geometry.vectors import Ints
 from ..interop.clouds import to_point_cloud
-from .points import Representatives
+from .points import WorkingCloud
 
 
 def at_rest(positions: np.ndarray, rings: Rings) -> dict[str, Any]:
@@ -28,7 +28,7 @@ def at_rest(positions: np.ndarray, rings: Rings) -> dict[str, Any]:
 
 
 @dataclass(frozen=True, eq=False)
-class Contraction(Representatives):
+class Contraction(WorkingCloud):
     """A cloud on its way to its skeleton.
 
     It has the attributes of `Points` except the neighbourhoods, the arrays over the survivors, and:
@@ -90,10 +90,11 @@ class Contraction(Representatives):
         is noise, or was before they were averaged, since it is their mean. Others are represented by that of the sample
         which stands for them, if it is another one.
         """
-        several = np.bincount(self.representative_of_point[self.sampled], minlength=len(self.cloud)) > 1
-        shows = self.sampled & (self._of_points((self.noise > 0) | several) > 0)
-        shows[self._point_of_row[self.thinned]] = True
-        points, others = np.arange(len(self.points)), self._of_points(self._point_of_row)
+        sampled, first = self.map.sampled, self.map.point_of_row
+        several = np.bincount(self.map.row_of_point[sampled], minlength=len(self.cloud)) > 1
+        shows = sampled & (self.map.to_points((self.noise > 0) | several) > 0)
+        shows[first[self.thinned]] = True
+        points, others = np.arange(len(self.points)), self.map.to_points(first)
         return np.where(shows, points, np.where(others == points, -1, others))
 
     @property

@@ -1,4 +1,4 @@
-"""Points: a cloud in its working frame, and which of its points speak for which."""
+"""Points: a cloud in its working frame, and which of its points represent which."""
 
 from __future__ import annotations
 
@@ -14,19 +14,28 @@ from ..geometry.area_sampling import SurfaceSample, sample_by_area, vertices_mis
 from ..geometry.frame import Frame, not_finite, to_working_frame
 from ..geometry.grid_sampling import sample_cloud
 from ..geometry.neighbourhoods import principal, row_medians
+from ..geometry.numbers import fitted, speed
 from ..geometry.rows import reach_next_rows
 from ..geometry.vectors import TINY, Ints, finite_rows
 from ..interop.clouds import cloud_counts, surface_mesh, to_point_cloud
+from .point_map import PointMap
 from .report import Report
 
-Some = TypeVar("Some", bound="Representatives")
+Working = TypeVar("Working", bound="WorkingCloud")
 
-# Fitted: median sphericity of clean neighbourhoods at most, and of nothing but noise.
-CLEAN_SPHERICITY, NOISE_SPHERICITY = 0.2, 0.35
-RIDGE_NEIGHBOURS = 32  # fitted: among which a ridge is sought: more than for rings, a noisy shell is thick
 
-ENOUGH = 2400  # fitted: points on a body without thin parts; fewer are not thinned
-MOST_CONTRACTED = 25000  # speed: points of most clouds that are contracted
+@dataclass(frozen=True)
+class PointNumbers:
+    """Numbers of the preparation of points that several filters share."""
+
+    clean: float = fitted(0.2, "median sphericity of clean neighbourhoods at most")
+    noisy: float = fitted(0.35, "median sphericity of neighbourhoods of nothing but noise")
+    ridge_neighbours: int = fitted(32, "neighbours among which a ridge is sought; a noisy shell is thick")
+    enough: int = fitted(2400, "points on a body without thin parts; fewer are not thinned")
+    most: int = speed(25000, "points of most clouds that are contracted")
+
+
+POINTS = PointNumbers()
 
 
 def default_k(n: int) -> int:
@@ -43,30 +52,26 @@ def default_size(n: int) -> int:
     More points make the axis hardly more exact, since neither noise nor the thickness of parts shrinks with their
     spacing; they only cost time.
     """
-    size: int = max(MOST_CONTRACTED, round(64 * np.sqrt(n)))
+    size: int = max(POINTS.most, round(64 * np.sqrt(n)))
     return min(n, size)
 
 
 @dataclass(frozen=True, eq=False)
-class Representatives:
-    """What `Points` and `Contraction` have in common: who speaks for whom.
+class WorkingCloud:
+    """What `Points` and `Contraction` have in common: a cloud in its working frame, and who represents whom.
 
     Arrays over the N input points are in the user's order and units. Everything else lives in the working frame: m
     distinct points in Morton order, of which n survive.
     """
 
     points: np.ndarray
-    representative_of_point: np.ndarray
-    outlier: np.ndarray
-    sampled: np.ndarray
+    map: PointMap
     frame: Frame
     cloud: np.ndarray
     weight: np.ndarray
     merged: np.ndarray
     noise: np.ndarray
     normals: np.ndarray
-    survivors: Ints
-    representative: np.ndarray
     report: Report
 
     def __repr__(self) -> str:
@@ -76,50 +81,41 @@ class Representatives:
         return len(self.survivors)
 
     @property
+    def survivors(self) -> Ints:
+        """Remaining rows of `cloud`, (n,) int array."""
+        return self.map.survivors
+
+    @property
+    def outlier(self) -> np.ndarray:
+        """Outliers, (N,) bool array."""
+        return self.map.outlier
+
+    @property
     def survivor_of_point(self) -> np.ndarray:
-        """For every input point the survivor that speaks for it, (N,) int array; -1 for dropped points."""
-        return self._of_points(self.representative)
-
-    @property
-    def point_of_survivor(self) -> np.ndarray:
-        """For every survivor the first input point that it is, (n,) int array."""
-        return self._point_of_row[self.survivors]
-
-    @property
-    def _point_of_row(self) -> np.ndarray:
-        """For every distinct point the first input point that it is, (m,) int array."""
-        points = np.flatnonzero(self.sampled)[::-1]  # of several writes the last one stays
-        first = np.empty(len(self.cloud), int)
-        first[self.representative_of_point[points]] = points
-        return first
+        """The survivor that represents every input point, (N,) int array; -1 for dropped points."""
+        return self.map.survivor_of_point
 
     @property
     def has_normal(self) -> np.ndarray:
         """Input points with a normal, (N,) bool array: those that determine the surface, and their copies."""
         if self.report.is_sampled or self.report.n_by_area:
-            return self.sampled
-        return (self.representative_of_point >= 0) & ~self.outlier
+            return self.map.sampled
+        return (self.map.row_of_point >= 0) & ~self.outlier
 
-    def with_report(self: Some, report: Report) -> Some:
+    def with_report(self: Working, report: Report) -> Working:
         """The same with another record of the run."""
         return replace(self, report=report)
 
-    def merged_into(self: Some, representative: np.ndarray, **changes: Any) -> Some:
-        """The same with survivors merged into others, each into the `representative` (n,) of it; a survivor is its own.
+    def merged_into(self: Working, into: np.ndarray, **changes: Any) -> Working:
+        """The same with survivors merged `into` others (n,); one that stays is its own.
 
-        `changes` are the fields over the survivors that are left.
+        `changes` are the fields over the survivors that remain.
         """
-        kept = representative == np.arange(len(representative))
-        left = (np.cumsum(kept) - 1)[representative]
-        return replace(self, survivors=self.survivors[kept], representative=left[self.representative], **changes)
-
-    def _of_points(self, values: np.ndarray) -> np.ndarray:
-        """Ints (m,) of distinct points for every input point, -1 for dropped ones."""
-        return np.append(values, -1)[self.representative_of_point]
+        return replace(self, map=self.map.merge(into), **changes)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Points(Representatives):
+class Points(WorkingCloud):
     """A cloud on its way to its rings.
 
     Filters that prepare a cloud merge copies, noisy points and near points, and set outliers aside. A remaining point
@@ -129,11 +125,8 @@ class Points(Representatives):
     ----------
     points : (N, 3) float64 array
         The input; of a mesh that is sampled its vertices, and the sample after them.
-    representative_of_point : (N,) int array
-        Row of `cloud` of each input point; -1 if it is not finite.
-    outlier, sampled : (N,) bool array
-        Outliers, which the nearest distinct point represents; and points that determine the surface: no outliers, one
-        of copies, and only the sample of a large cloud.
+    map : PointMap
+        From the input points to the rows of `cloud` and to those that remain, the survivors.
     frame : Frame
     cloud : (m, 3) float64 array
         Distinct input points; noisy ones denoised, and where there are many, means of several.
@@ -143,10 +136,6 @@ class Points(Representatives):
         Share of noise in the neighbourhood of each, from 0 to 1.
     normals : (m, 3) float64 array
         Unit normals of the tangent planes before points were moved to ridges, up to their sign.
-    survivors : (n,) int array
-        Remaining rows of `cloud`, ascending; all until the cloud is thinned.
-    representative : (m,) int array
-        The survivor (0 .. n-1) that each distinct point was merged into; itself for a survivor.
     neighbours : (n, k) int array
         The nearest survivors of each, nearest first after the point itself; as many as reach into the next rows where
         points lie in rows, such as scan lines.
@@ -226,9 +215,7 @@ class Points(Representatives):
         sampled[kept[first]] = True
         return cls(
             points=points,
-            representative_of_point=np.append(row, -1)[place],
-            outlier=np.zeros(len(points), bool),
-            sampled=sampled,
+            map=PointMap.of_rows(np.append(row, -1)[place], sampled, len(cloud)),
             frame=frame,
             weight=weight,
             merged=np.ones(len(cloud)),
@@ -241,55 +228,46 @@ class Points(Representatives):
 
         `neighbours` are those of the remaining rows, as positions among these.
         """
-        first, aside = self.point_of_survivor, self._of_points(gone) > 0
-        kept, position = np.flatnonzero(self.sampled & ~aside), np.full(len(self.points), -1)
+        first, aside = self.map.point_of_survivor, self.map.to_points(gone) > 0
+        kept, position = np.flatnonzero(self.map.sampled & ~aside), np.full(len(self.points), -1)
         position[kept] = np.arange(len(kept))
-        left = position[first]
-        place = np.where(aside, -1, self._of_points(left))
+        of_row = position[first]
+        place = np.where(aside, -1, self.map.to_points(of_row))
         place[kept] = np.arange(len(kept))
         by = "box" if self.frame.mean is None else "spread"
-        rows, known, weight = left[~gone], np.empty_like(neighbours), np.empty(len(kept))
+        rows, known, weight = of_row[~gone], np.empty_like(neighbours), np.empty(len(kept))
         known[rows], weight[rows] = rows[neighbours], self.weight[~gone]
         points = self._of_rows(self.points, kept, place, weight, by, self.report, known)
         nearest = np.full(len(gone), -1)
         nearest[gone] = cKDTree(points.cloud).query(points.frame.into(self.points[first[gone]]))[1]
-        representative = np.where(aside, self._of_points(nearest), points.representative_of_point)
-        return replace(points, representative_of_point=representative, outlier=self.outlier | aside)
-
-    def aside(self, rows: np.ndarray) -> Points:
-        """These with some rows, (m,) bool array, counted as outliers."""
-        aside = self._of_points(rows) > 0
-        return replace(self, outlier=self.outlier | aside, sampled=self.sampled & ~aside)
+        row_of_point = np.where(aside, self.map.to_points(nearest), points.map.row_of_point)
+        return replace(points, map=replace(points.map, row_of_point=row_of_point, outlier=self.outlier | aside))
 
     def check_whole(self, filter: Any) -> None:
         """Raise StageError if they were thinned: the filter needs all of them."""
         if len(self) < len(self.cloud):
             raise StageError(f"{type(filter).__name__} comes before Thinner, which has merged points already")
 
-    def remade(self, row: np.ndarray, cloud: np.ndarray, neighbours: np.ndarray, **changes: Any) -> Points:
+    def with_rows(self, row: np.ndarray, cloud: np.ndarray, neighbours: np.ndarray, **changes: Any) -> Points:
         """These with new rows: `row` (m,) is the new row of each old one. Neighbourhoods are measured anew.
 
         `changes` are other fields over the new rows.
         """
-        made = _measured(cloud, neighbours) | changes
-        return replace(self, representative_of_point=self._of_points(row), **made)
+        return replace(self, map=self.map.moved(row, len(cloud)), **_measured(cloud, neighbours) | changes)
 
     def common(self) -> dict[str, Any]:
-        """The fields of `Representatives`, for the next state."""
-        return {field.name: getattr(self, field.name) for field in fields(Representatives)}
+        """The fields of `WorkingCloud`, for the next state."""
+        return {field.name: getattr(self, field.name) for field in fields(WorkingCloud)}
 
 
 def _measured(cloud: np.ndarray, neighbours: np.ndarray) -> dict[str, Any]:
     """Rows that all survive, with what their neighbourhoods are like, as fields of `Points`."""
     neighbours = reach_next_rows(cloud, neighbours)
     spread, normals = principal(cloud, neighbours)
-    everybody = np.arange(len(cloud))
     return dict(
         cloud=cloud,
         noise=noise_share(spread, neighbours),
         normals=normals,
-        survivors=everybody,
-        representative=everybody,
         neighbours=neighbours,
         spread=spread,
         ring_normals=normals,
@@ -298,8 +276,8 @@ def _measured(cloud: np.ndarray, neighbours: np.ndarray) -> dict[str, Any]:
 
 def on_surface(mesh: tuple[np.ndarray, np.ndarray], sample: Any = "auto") -> SurfaceSample:
     """The points that stand for a mesh, by the option `sample` of the Sampler: none where its vertices do."""
-    if sample == "auto" and vertices_mislead(mesh, default_k, ENOUGH):
-        sample = MOST_CONTRACTED
+    if sample == "auto" and vertices_mislead(mesh, default_k, POINTS.enough):
+        sample = POINTS.most
     return sample_by_area(*mesh, 0 if isinstance(sample, str) else int(sample))
 
 
@@ -318,5 +296,5 @@ def noise_share(spread: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     "Dimensionality based scale selection in 3D lidar point clouds"); from 0.2 to 0.35 it is mapped to 0 to 1.
     """
     sphericity = row_medians((spread[:, 0] / np.maximum(spread[:, 2], TINY)).take(neighbours))
-    rise = (sphericity - CLEAN_SPHERICITY) / (NOISE_SPHERICITY - CLEAN_SPHERICITY)
+    rise = (sphericity - POINTS.clean) / (POINTS.noisy - POINTS.clean)
     return np.clip(rise, 0, 1)

@@ -10,13 +10,23 @@ from ..data.skeleton import Skeleton
 from ..geometry.farthest_point import farthest_point_sampling
 from ..geometry.groups import group_median, group_sum
 from ..geometry.neighbourhoods import nearest_neighbours, row_medians
+from ..geometry.numbers import fitted, measured
 from ..geometry.radii import plane_distance_radii
 from ..geometry.vectors import norm
 from ..parameters import documented, parameter, resolve_length
 from ..pipeline import Filter, RunContext
 
-LEAST_RADIUS = 1.0  # fitted: of a ball around a vertex, in percent of the diagonal
-RING_WIDTH = 2  # fitted: mean edges of a ring across it: nearer vertices would share the points around them
+
+@dataclass(frozen=True)
+class ConnectorNumbers:
+    """Numbers of the Connector."""
+
+    radius: float = fitted(1.0, "radius of a ball around a vertex, in percent of the diagonal")
+    ring_width: float = fitted(2, "mean edges of a ring across it: nearer vertices would share points")
+    smoothing: int = measured(16, "survivors over which the contraction distance is smoothed")
+
+
+CONNECTOR = ConnectorNumbers()
 
 
 @documented
@@ -68,9 +78,9 @@ class Connector(Filter[Contraction, Skeleton]):
 
     def run(self, state: Contraction, context: RunContext) -> Skeleton:
         auto, diagonal = self.radius == "auto", state.frame.diagonal * state.frame.scale
-        radius: Any = resolve_length(f"{LEAST_RADIUS}%" if auto else self.radius, diagonal) / state.frame.scale
+        radius: Any = resolve_length(f"{CONNECTOR.radius}%" if auto else self.radius, diagonal) / state.frame.scale
         if auto:
-            radius = np.minimum(radius, RING_WIDTH * state.rings.mean_lengths(state.cloud[state.survivors]))
+            radius = np.minimum(radius, CONNECTOR.ring_width * state.rings.mean_lengths(state.cloud[state.survivors]))
         balls = np.maximum(radius, self.thickness * contraction_distance(state))
         samples, vertex_of_survivor = farthest_point_sampling(state.positions, balls)
         mass = group_sum(state.mass, vertex_of_survivor, len(samples))[:, None]
@@ -79,9 +89,9 @@ class Connector(Filter[Contraction, Skeleton]):
         survivor = state.survivor_of_point
         vertex_of_point = np.where(survivor >= 0, vertex_of_survivor[survivor], -1)
         # copies, and what a sample stands for, count with one point
-        once = np.where(state.sampled, vertex_of_point, -1)
+        once = np.where(state.map.sampled, vertex_of_point, -1)
         normals = np.full_like(state.points, np.nan)
-        normals[state.has_normal] = state.normals[state.representative_of_point[state.has_normal]]
+        normals[state.has_normal] = state.normals[state.map.row_of_point[state.has_normal]]
         return Skeleton(
             vertices=vertices,
             edges=self._edges(state, vertex_of_survivor),
@@ -106,7 +116,8 @@ class Connector(Filter[Contraction, Skeleton]):
 
 
 def contraction_distance(state: Contraction) -> np.ndarray:
-    """Median distance in the frame, smoothed over 16, of each survivor's points to where they were contracted."""
-    distance = group_median(norm(state.cloud - state.positions[state.representative]), state.representative, len(state))
-    _, neighbours = nearest_neighbours(state.positions, min(16, len(state)))
+    """Median distance in the frame of each survivor's points to where they were contracted, smoothed, (n,)."""
+    survivor = state.map.survivor_of_row
+    distance = group_median(norm(state.cloud - state.positions[survivor]), survivor, len(state))
+    _, neighbours = nearest_neighbours(state.positions, min(CONNECTOR.smoothing, len(state)))
     return row_medians(distance.take(neighbours))

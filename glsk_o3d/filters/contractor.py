@@ -13,6 +13,7 @@ from ..data.report import REFUSED, STOPPED_BY_CALLER, IterationRecord
 from ..geometry.cotangent import cotangent_laplacian
 from ..geometry.eigen import largest_eigenvalue
 from ..geometry.neighbourhoods import wide_covariances
+from ..geometry.numbers import derived, fitted
 from ..geometry.rings import Rings
 from ..geometry.solver import Elimination, SolveError, solve_contraction
 from ..geometry.vectors import TINY
@@ -20,8 +21,18 @@ from ..parameters import documented, parameter
 from ..pipeline import Filter, RunContext
 from .stopping import ExplainedScore, StopRule
 
-LINE_VARIANCE = 0.99  # fitted: explained variance that counts as a line
-OWN_WEIGHT = 4  # fitted: neighbours that a point counts as in its own surroundings
+
+@dataclass(frozen=True)
+class ContractorNumbers:
+    """Numbers of the Contractor."""
+
+    line_variance: float = fitted(0.99, "explained variance that counts as a line")
+    own_weight: int = fitted(4, "neighbours that a point counts as in its own surroundings")
+    rounding: float = derived(1e-12, "share of the squares of which a difference is rounding")
+
+
+CONTRACTOR = ContractorNumbers()
+
 
 Reducer: TypeAlias = Callable[[Contraction], Contraction]
 Laplacian: TypeAlias = Callable[[Contraction], csr_matrix]
@@ -135,7 +146,7 @@ class Contractor(Filter[Contraction, Contraction]):
         with np.errstate(divide="ignore"):
             attraction = state.ring_size0 / state.ring_size  # Wen (5)
         if self.line_hold > 1 and state.report.iterations:
-            line = explained_variance(state.positions, state.rings) > LINE_VARIANCE
+            line = explained_variance(state.positions, state.rings) > CONTRACTOR.line_variance
             attraction = np.where(line, self.line_hold, 1) * attraction
         attraction = np.minimum(attraction, self.max_attraction)
         laplacian, mass = laplacian_of(state), np.sqrt(state.mass)
@@ -181,10 +192,12 @@ def explained_variance(points: np.ndarray, rings: Rings) -> np.ndarray:
     The moments of a point are averaged with those of its ring, twice, and count as much as four neighbours. Rings cost
     a third of what asking for the nearest points costs, and are as good.
     """
-    own = (OWN_WEIGHT / (OWN_WEIGHT + rings.sizes))[:, None]
+    own = (CONTRACTOR.own_weight / (CONTRACTOR.own_weight + rings.sizes))[:, None]
     spread, square = wide_covariances(points, lambda values: own * values + (1 - own) * rings.mean_over(values), 2)
     total = spread[0] + spread[3] + spread[5]
-    rounding = 1e-12 * (square[0] + square[3] + square[5])  # of the differences: what is less has no direction
+    rounding = CONTRACTOR.rounding * (
+        square[0] + square[3] + square[5]
+    )  # of the differences: what is less has no direction
     return np.where(total > rounding, largest_eigenvalue(spread) / np.maximum(total, TINY), 0)
 
 

@@ -1,12 +1,12 @@
 """Denoiser: points -> averaged where there are plenty, and noisy ones drawn to the ridge of their density."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..curve.surface import ENOUGH_POINTS
-from ..data.points import RIDGE_NEIGHBOURS, Points, default_k
+from ..curve.numbers import CURVE
+from ..data.points import POINTS, Points, default_k
 from ..geometry.eigen import main_direction
 from ..geometry.frame import MIN_POINTS
 from ..geometry.groups import group_sum
@@ -17,15 +17,24 @@ from ..geometry.neighbourhoods import (
     nearest_moved,
     nearest_neighbours,
 )
+from ..geometry.numbers import fitted, speed
 from ..geometry.pairing import Pairs, merge_pairs
 from ..geometry.vectors import PAIRS
 from ..parameters import documented, parameter
 from ..pipeline import Filter, RunContext
 
-RIDGE_CHUNK = 1024  # speed: points at a time: the (3, points, 32) work arrays then stay in the cache
-MOST_IN_ONE = 4  # fitted: noisy points that are averaged in a pass
-MERGE_WORTH = 0.01  # fitted: share of the points that another round of a pass must merge
-DENOISED_RATIO = 1.8  # fitted: local outlier ratio of a denoised outlier
+
+@dataclass(frozen=True)
+class DenoiserNumbers:
+    """Numbers of the Denoiser."""
+
+    chunk: int = speed(1024, "points at a time: their work arrays then stay in the cache")
+    most_in_one: int = fitted(4, "noisy points that are averaged in a pass")
+    merge_worth: float = fitted(0.01, "share of the points that another round of a pass must merge")
+    outlier_ratio: float = fitted(1.8, "local outlier ratio of a denoised outlier")
+
+
+DENOISER = DenoiserNumbers()
 
 
 @documented
@@ -65,10 +74,12 @@ class Denoiser(Filter[Points, Points]):
 
 def averaged(points: Points) -> Points:
     """Points with means in the place of noisy ones, while there are plenty of these."""
-    while np.count_nonzero(points.noise) >= 2 * ENOUGH_POINTS:
-        row, mean, weight = average_noisy(points.cloud, points.neighbours, points.noise, points.weight, ENOUGH_POINTS)
+    while np.count_nonzero(points.noise) >= 2 * CURVE.enough_points:
+        row, mean, weight = average_noisy(
+            points.cloud, points.neighbours, points.noise, points.weight, CURVE.enough_points
+        )
         neighbours = nearest_neighbours(mean, default_k(len(mean)))[1]
-        points = points.remade(row, mean, neighbours, weight=weight, merged=np.bincount(row, points.merged))
+        points = points.with_rows(row, mean, neighbours, weight=weight, merged=np.bincount(row, points.merged))
         if 2 * len(mean) > len(row):
             break
     return points
@@ -85,16 +96,16 @@ def to_ridges(points: Points, passes: int) -> Points:
     k = points.neighbours.shape[1]
     neighbours = nearest_moved(denoised, points.neighbours, points.noise > 0)
     mean_distance = mean_distances(denoised, neighbours)
-    outlier = (local_outlier_ratio(mean_distance, neighbours) > DENOISED_RATIO) & (points.noise > 0)
+    outlier = (local_outlier_ratio(mean_distance, neighbours) > DENOISER.outlier_ratio) & (points.noise > 0)
     if outlier.sum() > len(denoised) - max(k, MIN_POINTS):  # too few would be left
         outlier[:] = False
-    left, row = np.flatnonzero(~outlier), np.cumsum(~outlier) - 1
-    if len(left) < len(denoised):
-        row[outlier] = cKDTree(denoised[left]).query(denoised[outlier])[1]
-        denoised, neighbours = denoised[left], nearest_left(denoised, neighbours, ~outlier, k)
-        points = points.aside(outlier)
-    kept = {name: getattr(points, name)[left] for name in ("weight", "merged", "noise", "normals")}
-    return points.remade(row, denoised, neighbours, **kept)
+    remaining, row = np.flatnonzero(~outlier), np.cumsum(~outlier) - 1
+    if len(remaining) < len(denoised):
+        row[outlier] = cKDTree(denoised[remaining]).query(denoised[outlier])[1]
+        denoised, neighbours = denoised[remaining], nearest_left(denoised, neighbours, ~outlier, k)
+        points = replace(points, map=points.map.set_aside(outlier))
+    kept = {name: getattr(points, name)[remaining] for name in ("weight", "merged", "noise", "normals")}
+    return points.with_rows(row, denoised, neighbours, **kept)
 
 
 def average_noisy(
@@ -106,12 +117,12 @@ def average_noisy(
     noise, and its neighbourhood is wider. Returns the mean that each point is in, (m,) int array, the means (c, 3),
     and their `weight` (c,), the sum of that of their points (m,).
     """
-    most = np.where(noise > 0, min(MOST_IN_ONE, np.count_nonzero(noise) / n), 1)
+    most = np.where(noise > 0, min(DENOISER.most_in_one, np.count_nonzero(noise) / n), 1)
 
     def choose(pairs: Pairs, mass: np.ndarray) -> Pairs:
         kept, swallowed = pairs
         fine = mass[kept] + mass[swallowed] <= np.minimum(most[kept], most[swallowed])
-        worth_it = np.count_nonzero(fine) >= MERGE_WORTH * len(points)
+        worth_it = np.count_nonzero(fine) >= DENOISER.merge_worth * len(points)
         return kept[fine & worth_it], swallowed[fine & worth_it]
 
     representative = merge_pairs(points, neighbours, choose, most)
@@ -135,19 +146,19 @@ def subspace_mean_shift(
         return points
     weight = np.ones(len(points)) if weight is None else weight
     moved, coordinates = points.copy(), np.ascontiguousarray(points.T)
-    around = nearest_neighbours(points, min(RIDGE_NEIGHBOURS, len(points)), of=points[noisy])[1]
-    for start in range(0, len(noisy), RIDGE_CHUNK):
-        part = slice(start, start + RIDGE_CHUNK)
+    around = nearest_neighbours(points, min(POINTS.ridge_neighbours, len(points)), of=points[noisy])[1]
+    for start in range(0, len(noisy), DENOISER.chunk):
+        part = slice(start, start + DENOISER.chunk)
         patch, mass = coordinates.take(around[part], axis=1), weight.take(around[part])
         step, x = noise[noisy[part]], coordinates[:, noisy[part]]
         for _ in range(passes):
-            apart = patch - x[:, :, None]
-            squared = (apart * apart).sum(axis=0)
+            offset = patch - x[:, :, None]
+            squared = (offset * offset).sum(axis=0)
             kernel = mass * np.exp(squared / (-2 * squared.mean(axis=1, keepdims=True)))
             kernel /= kernel.sum(axis=1, keepdims=True)
-            heavy = kernel * apart
+            heavy = kernel * offset
             shift = heavy.sum(axis=2)
-            spread = [np.einsum("nk,nk->n", heavy[i], apart[j]) - shift[i] * shift[j] for i, j in PAIRS]
+            spread = [np.einsum("nk,nk->n", heavy[i], offset[j]) - shift[i] * shift[j] for i, j in PAIRS]
             along = main_direction(np.stack(spread)).T
             shift -= (shift * along).sum(axis=0) * along
             x = x + step * shift

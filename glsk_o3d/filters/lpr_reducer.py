@@ -8,17 +8,27 @@ import numpy as np
 from ..data.contraction import Contraction
 from ..errors import StageError
 from ..geometry.neighbourhoods import plane_axes
+from ..geometry.numbers import fitted, published
 from ..geometry.rings import Rings, star_rings
 from ..geometry.vectors import Floats, dot, norm
 from ..parameters import documented, parameter
 from ..pipeline import Filter, RunContext
 
-PSI_FACTOR = 1.2  # published: psi' over psi
-AMPLIFICATION_SQUARED = 9  # published: s_L squared, in the code and not in the paper
-CURVATURE_WEIGHT = 3  # published: of U in F
-IN_PLANE_SINE = 1e-3  # fitted: sine of the angle below which a direction counts as lying in the tangent plane
+
+@dataclass(frozen=True)
+class ReducerNumbers:
+    """Numbers of the LPRReducer."""
+
+    psi_factor: float = published(1.2, "psi' over psi")
+    amplification_squared: float = published(9, "s_L squared, in the code and not in the paper")
+    curvature: float = published(3, "weight of U in F")
+    in_plane: float = fitted(1e-3, "sine of the angle below which a direction lies in the tangent plane")
+    least_shrinkage: float = published(1e-4, "floor of s - psi' s(0) in the working frame")
+
+
+REDUCER = ReducerNumbers()
+
 OF_SURVIVORS = ("positions", "previous", "laplacian_coordinates", "mass", "ring_size0", "ring_size")
-MIN_SHRINKAGE = 1e-4  # published: floor of s - psi' s(0) in the working frame, as in the published code
 
 
 @documented
@@ -82,7 +92,7 @@ class LPRReducer(Filter[Contraction, Contraction]):
         energy = merge_energy(state)
         candidates = np.flatnonzero(energy < self.phi * state.ring_size**2)  # Wen (12)
         if self.order == "index":
-            rank = state.point_of_survivor[candidates]
+            rank = state.map.point_of_survivor[candidates]
         else:
             with np.errstate(divide="ignore"):
                 rank = energy[candidates] / state.ring_size[candidates] ** 2
@@ -103,12 +113,12 @@ class LPRReducer(Filter[Contraction, Contraction]):
         rings = state.rings.replace(representatives, combined).take(np.flatnonzero(keep)).rename(index[representative])
         if self.mend_rings:
             rings = mend_rings(rings, state.cloud[survivors], state.normals[survivors])
-        left = {name: getattr(state, name)[keep] for name in OF_SURVIVORS}
+        of_survivors = {name: getattr(state, name)[keep] for name in OF_SURVIVORS}
         if self.conserve_mass:
-            left["mass"] = np.bincount(representative, state.mass, n)[keep]
-            _, left["ring_size0"] = rings.nearest(state.cloud[survivors])
-            _, left["ring_size"] = rings.nearest(left["positions"])
-        return state.merged_into(representative, rings=rings, **left)
+            of_survivors["mass"] = np.bincount(representative, state.mass, n)[keep]
+            _, of_survivors["ring_size0"] = rings.nearest(state.cloud[survivors])
+            _, of_survivors["ring_size"] = rings.nearest(of_survivors["positions"])
+        return state.merged_into(representative, rings=rings, **of_survivors)
 
 
 def merge_energy(state: Contraction) -> np.ndarray:
@@ -120,16 +130,18 @@ def merge_energy(state: Contraction) -> np.ndarray:
     Minus infinity where a ring did not change.
     """
     s0, s, delta = state.ring_size0, state.ring_size, state.laplacian_coordinates
-    drop = PSI_FACTOR * state.ring_ratio_drop  # psi'
-    eta = np.maximum(s - drop * s0, MIN_SHRINKAGE) / s0  # Wen (11)
+    drop = REDUCER.psi_factor * state.ring_ratio_drop  # psi'
+    eta = np.maximum(s - drop * s0, REDUCER.least_shrinkage) / s0  # Wen (11)
     moved = norm(state.positions - state.previous)
     with np.errstate(divide="ignore", invalid="ignore"):
         pulled = np.nan_to_num(drop * s0 * moved / (eta * (s0 - s)), nan=0.0, posinf=np.inf, neginf=-np.inf)
-    contraction: Floats = (AMPLIFICATION_SQUARED * state.contraction_weight * eta) ** 2 * dot(delta, delta)  # Wen (7)
+    contraction: Floats = (REDUCER.amplification_squared * state.contraction_weight * eta) ** 2 * dot(
+        delta, delta
+    )  # Wen (7)
     attraction: Floats = pulled**2  # Wen (8)
     curved = delta - state.rings.mean_over(delta)
     curvature = dot(curved, curved)  # Wen (9)
-    return contraction - attraction + CURVATURE_WEIGHT * curvature  # Wen (6)
+    return contraction - attraction + REDUCER.curvature * curvature  # Wen (6)
 
 
 def combine_rings(state: Contraction, representatives: np.ndarray, swallowed: np.ndarray) -> Rings:
@@ -143,7 +155,7 @@ def combine_rings(state: Contraction, representatives: np.ndarray, swallowed: np
     delta = state.laplacian_coordinates[representatives]
     length = norm(delta)[:, None]
     # of a flat ring they are nothing but rounding, and lead anywhere
-    enough = IN_PLANE_SINE * np.maximum(length, state.ring_size[representatives, None])
+    enough = REDUCER.in_plane * np.maximum(length, state.ring_size[representatives, None])
     along = np.abs(dot(delta, normals))[:, None] > enough
     direction = np.where(along, np.divide(delta, length, out=np.zeros_like(delta), where=along), normals)
     return star_rings(state.cloud[state.survivors], representatives, union, plane_axes(direction))
@@ -159,8 +171,8 @@ def match_feasible(state: Contraction, representatives: np.ndarray, swallowed: n
     rings, ring_of = Rings.concatenate([]), np.full(len(state), -1)
     feasible = np.ones(len(representatives), bool)
     while True:
-        left = np.flatnonzero(feasible)
-        chosen = left[match(len(state), representatives[left], swallowed[left])]
+        remaining = np.flatnonzero(feasible)
+        chosen = remaining[match(len(state), representatives[remaining], swallowed[remaining])]
         new = chosen[ring_of[representatives[chosen]] < 0]
         if len(new) == 0:
             return representatives[chosen], rings.take(ring_of[representatives[chosen]])
@@ -187,12 +199,14 @@ def match(n: int, representatives: np.ndarray, swallowed: np.ndarray) -> np.ndar
     # Rounds of the pairs that come before all others at both their points. Of nearest neighbours two or three do; only
     # a chain of pairs in its own order takes a round for every second one.
     pairs = np.stack([representatives, swallowed], axis=1)
-    free, first, left, chosen = np.ones(n, bool), np.empty(n, int), np.arange(len(pairs)), [np.empty(0, int)]
-    while len(left):
-        first[pairs[left[::-1]]] = left[::-1, None]  # of several writes the last one stays: that of the least position
-        ends = pairs[left]
-        wins = (first[ends] == left[:, None]).all(axis=1)
-        chosen.append(left[wins])
+    free, first, remaining, chosen = np.ones(n, bool), np.empty(n, int), np.arange(len(pairs)), [np.empty(0, int)]
+    while len(remaining):
+        first[pairs[remaining[::-1]]] = remaining[
+            ::-1, None
+        ]  # of several writes the last one stays: that of the least position
+        ends = pairs[remaining]
+        wins = (first[ends] == remaining[:, None]).all(axis=1)
+        chosen.append(remaining[wins])
         free[ends[wins]] = False
-        left = left[free[ends].all(axis=1)]
+        remaining = remaining[free[ends].all(axis=1)]
     return np.sort(np.concatenate(chosen))

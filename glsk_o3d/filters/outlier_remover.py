@@ -8,19 +8,30 @@ from ..data.points import Points
 from ..geometry.frame import MIN_POINTS
 from ..geometry.groups import component_labels
 from ..geometry.neighbourhoods import local_outlier_ratio, mean_distances, nearest_neighbours, principal, row_medians
+from ..geometry.numbers import fitted, speed
 from ..geometry.vectors import TINY
 from ..parameters import documented, parameter
 from ..pipeline import Filter, RunContext
 
-# All fitted, on clouds with outliers of 1 to 10 %, sparse limbs and crowns.
-MOST_ROUNDS = 20  # speed: clouds need less than ten, but spirals that get ever sparser one for every point
-DENSEST_HOPS = 4  # from neighbour to neighbour, within which the densest place is looked for
-FLOATING_RATIO = 5.0  # times as far from its neighbours as points there are: not for a surface that is only uneven
-FLOATING_SHARE = 0.1  # of all points that can float at most; more are a part of the object
-LIMB_NEIGHBOURS = 64  # among points far from theirs, that a limb of an object is longer than thick with
-MIXED_SHARE = 0.01  # of all points that surely are mixed pixels if there are any; fewer are at ends of a scan
-# least second and third over first principal spread of points that fill space
-FILLED_SECOND, FILLED_THIRD = 0.35, 0.1
+
+@dataclass(frozen=True)
+class OutlierNumbers:
+    """Numbers of the OutlierRemover, fitted on clouds with outliers of 1 to 10 %, sparse limbs and crowns."""
+
+    rounds: int = speed(20, "rounds; clouds need less than ten, but ever sparser spirals one a point")
+    hops: int = fitted(4, "hops between neighbours, within which the densest place is looked for")
+    floating_ratio: float = fitted(
+        5.0, "distance of points that float from their neighbours, over that of others there"
+    )
+    floating_share: float = fitted(0.1, "most share of points that float; more are a part of the object")
+    limb_neighbours: int = fitted(64, "neighbours among points far from theirs, with which a limb is longer than thick")
+    mixed_share: float = fitted(0.01, "least share of mixed pixels, if there are any; fewer are at ends of a scan")
+    filled_second: float = fitted(0.35, "least second over first principal spread of points that fill space")
+    filled_third: float = fitted(0.1, "least third over first principal spread of points that fill space")
+
+
+OUTLIER = OutlierNumbers()
+
 MIXED_OR_TWIGS = (
     "sparse points beside a surface may be mixed pixels of a depth camera or twigs, which cannot be told apart, and "
     "are kept: if they are of a camera, filter its flying pixels first"
@@ -63,13 +74,13 @@ class OutlierRemover(Filter[Points, Points]):
         cloud, weight, neighbours, factor = points.cloud, points.weight, points.neighbours, self.outlier_factor
         distance = mean_distances(cloud, neighbours)
         mixed, doubtful = mixed_pixels(points, distance, factor)
-        left, neighbours = inliers(cloud, weight, neighbours, distance, mixed, factor, MIN_POINTS)
+        remaining, neighbours = inliers(cloud, weight, neighbours, distance, mixed, factor, MIN_POINTS)
         if doubtful:
             points = replace(points, report=points.report.with_warning(MIXED_OR_TWIGS))
-        if len(left) == len(points):
+        if len(remaining) == len(points):
             return points
         gone = np.ones(len(points), bool)
-        gone[left] = False
+        gone[remaining] = False
         rest = points.without(gone, neighbours)
         return replace(rest, report=replace(rest.report, n_mixed=int(mixed.sum())))
 
@@ -90,23 +101,23 @@ def inliers(
     At least `least` points are left. `mixed` pixels (n,) go in the first round. Returned are the rows (m,) of those
     left, ascending, and their nearest neighbours among these, (m, k).
     """
-    left = np.arange(len(points))
-    for _ in range(MOST_ROUNDS):  # what is left of a cluster stands out once the rest is gone
+    remaining = np.arange(len(points))
+    for _ in range(OUTLIER.rounds):  # what is left of a cluster stands out once the rest is gone
         # as near as the neighbours would be if all were there
-        mean = distance / np.sqrt(weight[left].take(neighbours).mean(axis=1))
-        found = (local_outlier_ratio(mean, neighbours) > factor) | mixed[left]
-        if mean.max() > FLOATING_RATIO * mean.min():  # else none can float
-            found |= in_floating_cluster(points[left], weight[left], mean, neighbours)
-        keep = np.flatnonzero(~found)
-        if len(keep) == len(left) or len(keep) < least:
+        mean = distance / np.sqrt(weight[remaining].take(neighbours).mean(axis=1))
+        outlier = (local_outlier_ratio(mean, neighbours) > factor) | mixed[remaining]
+        if mean.max() > OUTLIER.floating_ratio * mean.min():  # else none can float
+            outlier |= in_floating_cluster(points[remaining], weight[remaining], mean, neighbours)
+        keep = np.flatnonzero(~outlier)
+        if len(keep) == len(remaining) or len(keep) < least:
             break
-        left, index = left[keep], np.cumsum(~found) - 1
-        k = min(neighbours.shape[1], len(left))
-        changed = np.flatnonzero(found[neighbours[keep]].any(axis=1))
-        distance, neighbours, there = distance[keep], index[neighbours[keep, :k]], points[left]
+        remaining, index = remaining[keep], np.cumsum(~outlier) - 1
+        k = min(neighbours.shape[1], len(remaining))
+        changed = np.flatnonzero(outlier[neighbours[keep]].any(axis=1))
+        distance, neighbours, there = distance[keep], index[neighbours[keep, :k]], points[remaining]
         near, neighbours[changed] = nearest_neighbours(there, k, of=there[changed])
         distance[changed] = near[:, 1:].mean(axis=1)
-    return left, neighbours
+    return remaining, neighbours
 
 
 def mixed_pixels(points: Points, distance: np.ndarray, factor: float) -> tuple[np.ndarray, bool]:
@@ -120,21 +131,21 @@ def mixed_pixels(points: Points, distance: np.ndarray, factor: float) -> tuple[n
     """
     n, (third, second, first), neighbours = len(points), points.spread.T, points.neighbours
     mean = distance / np.sqrt(points.weight.take(neighbours).mean(axis=1))
-    flat = (third < FILLED_THIRD * second) & (second > FILLED_SECOND * first)
-    none, few = np.zeros(n, bool), max(MIXED_SHARE * n, 2 * neighbours.shape[1])
+    flat = (third < OUTLIER.filled_third * second) & (second > OUTLIER.filled_second * first)
+    none, few = np.zeros(n, bool), max(OUTLIER.mixed_share * n, 2 * neighbours.shape[1])
     thick = mean * np.sqrt(np.sqrt(third / np.maximum(second, TINY)))
     densest = np.where(flat, mean, np.inf)
     if np.count_nonzero(thick > factor * densest.min()) <= few:  # as in most clouds
         return none, False
     each = np.ascontiguousarray(neighbours.T)
-    for _ in range(DENSEST_HOPS + 1):
+    for _ in range(OUTLIER.hops + 1):
         densest = densest.take(each).min(axis=0)
     if np.count_nonzero(thick > factor * densest) <= few:
         return none, False
-    found = thick > np.sqrt(factor) * densest
-    surface, sparse = np.count_nonzero(flat) / n, np.count_nonzero(found) / n
-    clear = surface >= 2 * FLOATING_SHARE and sparse < FLOATING_SHARE
-    return (found if clear else none), not clear
+    mixed = thick > np.sqrt(factor) * densest
+    surface, sparse = np.count_nonzero(flat) / n, np.count_nonzero(mixed) / n
+    clear = surface >= 2 * OUTLIER.floating_share and sparse < OUTLIER.floating_share
+    return (mixed if clear else none), not clear
 
 
 def in_floating_cluster(points: np.ndarray, weight: np.ndarray, mean: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
@@ -144,20 +155,20 @@ def in_floating_cluster(points: np.ndarray, weight: np.ndarray, mean: np.ndarray
     island; and together they fill space, or are a handful alone. A sparse surface is flat, and a sparse limb long.
     """
     densest, each = row_medians(mean.take(neighbours)), np.ascontiguousarray(neighbours.T)
-    for _ in range(DENSEST_HOPS):
+    for _ in range(OUTLIER.hops):
         densest = densest.take(each).min(axis=0)
-    island, sparse = np.zeros(len(points), bool), mean > FLOATING_RATIO * np.median(mean)
+    island, sparse = np.zeros(len(points), bool), mean > OUTLIER.floating_ratio * np.median(mean)
     if sparse.any():
         near = neighbours[:, 1:5]
         ends = np.column_stack([np.repeat(np.arange(len(points)), near.shape[1]), near.ravel()])
         part = component_labels(len(points), ends)
-        island = np.bincount(part, weight)[part] < FLOATING_SHARE * weight.sum()
-    far = np.flatnonzero((mean > FLOATING_RATIO * densest) | (island & sparse))
-    found = np.zeros(len(points), bool)
+        island = np.bincount(part, weight)[part] < OUTLIER.floating_share * weight.sum()
+    far = np.flatnonzero((mean > OUTLIER.floating_ratio * densest) | (island & sparse))
+    floating = np.zeros(len(points), bool)
     if len(far) > 3:
-        among = nearest_neighbours(points[far], min(LIMB_NEIGHBOURS, len(far)))[1]
+        among = nearest_neighbours(points[far], min(OUTLIER.limb_neighbours, len(far)))[1]
         third, second, first = principal(points[far], among)[0].T
-        found[far] = (second > FILLED_SECOND * first) & (third > FILLED_THIRD * first)
+        floating[far] = (second > OUTLIER.filled_second * first) & (third > OUTLIER.filled_third * first)
     if island.any():
-        found |= island & sparse & (np.bincount(part)[part] < LIMB_NEIGHBOURS)
-    return found & (weight[found].sum() < FLOATING_SHARE * weight.sum())
+        floating |= island & sparse & (np.bincount(part)[part] < OUTLIER.limb_neighbours)
+    return floating & (weight[floating].sum() < OUTLIER.floating_share * weight.sum())

@@ -15,7 +15,7 @@ from ..curve.shape.junctions import move_junctions
 from ..curve.shape.wide_ends import level_wide_ends
 from ..curve.surface import Surface
 from ..curve.thin.deferred import Deferred
-from ..curve.thin.detect import LEAST_SURFACE, without_detached_clumps
+from ..curve.thin.detect import THIN, without_detached_clumps
 from ..curve.topology.false_branches import FalseBranches
 from ..curve.topology.gaps import Gaps
 from ..curve.topology.loops import Loops
@@ -114,11 +114,8 @@ class Refiner(Filter[Skeleton, Skeleton]):
         return on_points(self._refined, curve, along_a_morton_curve(curve))
 
     def _refined(self, curve: Curve) -> Curve:
-        curve = collapse_triangles(curve, by_degree=self.collapse == "degree")
-        surface, deferred = Surface.of(curve), None
-        if self.recentre:
-            curve = pull_back_detached(curve)
-        curve = self._centred(curve, surface)
+        curve, surface = self.fitted(curve)
+        deferred = None
         if _may_be_asked(curve) and (self.recentre or self.handle or self.limb or self.air or self.bridge):
             curve, surface, deferred = self._decided(curve, surface.oriented(curve))
         if self.recentre and len(curve.vertices):
@@ -126,6 +123,19 @@ class Refiner(Filter[Skeleton, Skeleton]):
             size = curve.binary_size  # fourth powers of lengths must not overflow
             curve = regrow_ends(move_junctions(curve.scaled(1 / size)), self.ends == "surface").scaled(size)
         return measured(deferred.put_back(curve) if deferred else curve)
+
+    def fitted(self, curve: Curve) -> tuple[Curve, Surface]:
+        """A raw curve made one-dimensional and fitted to the axis of the surface around it, and that surface."""
+        curve = collapse_triangles(curve, by_degree=self.collapse == "degree")
+        surface = Surface.of(curve)
+        if self.recentre:
+            curve = pull_back_detached(curve)
+        return self._centred(curve, surface), surface
+
+    def after(self, question: Question, curve: Curve, surface: Surface) -> tuple[Curve, list[Decision]]:
+        """A curve after a question was answered for all its parts, fitted anew if it was changed; and the decisions."""
+        changed, decisions = ask(question, curve, surface, getattr(self, question.option))
+        return (curve if changed is curve else self._centred(changed, surface)), decisions
 
     def _decided(self, curve: Curve, surface: Surface) -> tuple[Curve, Surface, Deferred | None]:
         """Answer one question after the other; not again where the graph is the same, or has no more loops."""
@@ -135,14 +145,13 @@ class Refiner(Filter[Skeleton, Skeleton]):
         n_handles = 0
         for question in QUESTIONS:
             n_handles = min(n_handles, curve.n_loops)  # cuts may have opened some
-            least, about = getattr(self, question.option), question.about
-            if not least or answered.get(about) is curve or not _may_be_asked(curve):
+            about = question.about
+            if not getattr(self, question.option) or answered.get(about) is curve or not _may_be_asked(curve):
                 continue
             if question is Loops and curve.n_loops <= n_handles:
                 continue
-            changed, answers = ask(question(), curve, surface, least)
+            curve, answers = self.after(question(), curve, surface)
             decisions[about] = [*_changes(decisions[about]), *answers]
-            curve = curve if changed is curve else self._centred(changed, surface)
             answered[about] = curve
             if question is Loops:
                 n_handles = curve.n_loops
@@ -160,7 +169,7 @@ class Refiner(Filter[Skeleton, Skeleton]):
 
     def _without_deferred(self, curve: Curve, surface: Surface) -> tuple[Curve, Surface, Deferred | None]:
         """The curve without parts that are left to a Tracer, and the surface around it."""
-        deferred = Deferred.of(curve, LEAST_SURFACE) if self.set_aside and self.handle else None
+        deferred = Deferred.of(curve, THIN.least_surface) if self.set_aside and self.handle else None
         if not deferred:
             return curve, surface, None
         curve = deferred.rest()

@@ -84,7 +84,7 @@ class RingBuilder(Filter[Points, Contraction]):
             n_contracted=n,
             noise=float(points.noise.mean()),
         )
-        mass = np.bincount(points.representative, points.merged) * (n / points.merged.sum())
+        mass = np.bincount(points.map.survivor_of_row, points.merged) * (n / points.merged.sum())
         known = dict(report=report, mass=mass, thinned=points.survivors)
         return Contraction(**(points.common() | known | at_rest(cloud, rings)))
 

@@ -60,8 +60,8 @@ class Sampler(Filter[Cloud, Points]):
         points = Points.of(cloud, self.sample_size, self.frame, self.drop_invalid, self.sample)
         if isinstance(self.sample, str) or points.report.n_by_area:
             return points
-        told = f"Sampler.sample = {self.sample}: the cloud has no triangles with an area: its points are taken"
-        return replace(points, report=points.report.with_warning(told))
+        warning = f"Sampler.sample = {self.sample}: the cloud has no triangles with an area: its points are taken"
+        return replace(points, report=points.report.with_warning(warning))
 
     def sample_size(self, n: int) -> int:
         """Size of the sample of n points if n is more than twice as large."""

@@ -6,23 +6,32 @@ from typing import Literal
 import numpy as np
 from scipy.sparse import csr_array
 
-from ..data.points import ENOUGH, Points, default_k, default_size
+from ..data.points import POINTS, Points, default_k, default_size
 from ..geometry.eigen import principal_parts
 from ..geometry.neighbourhoods import nearest_left, principal, wide_covariances
+from ..geometry.numbers import derived, fitted, measured, speed
 from ..geometry.pairing import Pairs, merge_pairs
 from ..geometry.rows import reach_next_rows
 from ..geometry.vectors import TINY, norm
 from ..parameters import documented, parameter
 from ..pipeline import Filter, RunContext
 
-ASK_AGAIN = 0.25  # speed: share of the points left, below which the neighbours are looked up anew
-PACKED = 0.42  # measured: points left on an area of 1 if none are to be nearer than 1
-SMOOTHING = 8  # fitted: steps over which the thickness of parts is averaged
-LEAST_MERGED = 0.001  # measured: share of the points that a round must merge: along a spiral it is one each
-LEAST_AROUND = 3  # derived: points around the thinnest part
-WIDER_STEPS = 3  # measured: steps from neighbour to neighbour: fewer see no more than noise, more see other parts
-SHEET_FROM = 0.4  # measured: second over third variance of these, from which on they are a sheet; tubes of 10 have it
-WIDER_BIAS = 1.25  # measured: on tubes with 18 to 80 points around them, noise of up to a fifth of their spacing
+
+@dataclass(frozen=True)
+class ThinnerNumbers:
+    """Numbers of the Thinner."""
+
+    ask_again: float = speed(0.25, "share of the points, below which the neighbours are looked up anew")
+    packed: float = measured(0.42, "points left on an area of 1 if none are to be nearer than 1")
+    smoothing: int = fitted(8, "steps over which the thickness of parts is averaged")
+    least_merged: float = measured(0.001, "share of the points that a round must merge: along a spiral it is one each")
+    least_around: int = derived(3, "points around the thinnest part")
+    wider_steps: int = measured(3, "steps between neighbours: fewer see noise alone, more see other parts")
+    sheet_from: float = measured(0.4, "second over third variance of a sheet, at least; tubes of 10 have it")
+    wider_bias: float = measured(1.25, "bias of points around on tubes with 18 to 80 of them in noise")
+
+
+THINNER = ThinnerNumbers()
 
 
 @documented
@@ -63,14 +72,14 @@ class Thinner(Filter[Points, Points]):
         if self.thin_to == "all":
             return points
         before = np.inf
-        while self.around and ENOUGH <= len(points) <= before / 2:
-            before, here = len(points), points.cloud[points.survivors]
-            apart = spacing_enough(here, points.neighbours, points.spread, self.around)
-            points = _merged(points, thin_nearer(here, points.neighbours, apart))
+        while self.around and POINTS.enough <= len(points) <= before / 2:
+            before, places = len(points), points.cloud[points.survivors]
+            spacing = spacing_enough(places, points.neighbours, points.spread, self.around)
+            points = _merged(points, thin_nearer(places, points.neighbours, spacing))
         report = points.report
         if report.is_sampled and self.thin_to != "auto" and self.thin_to > report.n_sampled:
-            told = f"Thinner.thin_to = {self.thin_to}: the Sampler left {report.n_sampled} points: set Sampler.size"
-            points = replace(points, report=report.with_warning(told))
+            warning = f"Thinner.thin_to = {self.thin_to}: the Sampler left {report.n_sampled} points: set Sampler.size"
+            points = replace(points, report=report.with_warning(warning))
         n = max(report.n_input - report.n_dropped, report.n_by_area)
         most = default_size(n) if self.thin_to == "auto" else self.thin_to
         if most < len(points):
@@ -104,12 +113,12 @@ def thin(points: np.ndarray, neighbours: np.ndarray, n: int) -> np.ndarray:
         nearest = np.argsort(((points[kept] - points[swallowed]) ** 2).sum(axis=1), kind="stable")[:too_many]
         return kept[nearest], swallowed[nearest]
 
-    representative = merge_pairs(points, neighbours, choose, least=max(n, ASK_AGAIN * len(points)))
-    left = representative == np.arange(len(points))
-    rows = np.flatnonzero(left)
+    representative = merge_pairs(points, neighbours, choose, least=max(n, THINNER.ask_again * len(points)))
+    remaining = representative == np.arange(len(points))
+    rows = np.flatnonzero(remaining)
     if n < len(rows) < len(points):
-        around = nearest_left(points, neighbours, left, min(neighbours.shape[1], len(rows)))
-        representative = rows[thin(points[rows], around, n)][(np.cumsum(left) - 1)[representative]]
+        around = nearest_left(points, neighbours, remaining, min(neighbours.shape[1], len(rows)))
+        representative = rows[thin(points[rows], around, n)][(np.cumsum(remaining) - 1)[representative]]
     return representative
 
 
@@ -124,7 +133,7 @@ def thin_nearer(points: np.ndarray, neighbours: np.ndarray, apart: np.ndarray) -
         kept, swallowed = pairs
         reach = np.minimum(apart[kept], apart[swallowed])
         nearer = norm(points.take(kept, axis=0) - points.take(swallowed, axis=0)) < reach
-        nearer &= np.count_nonzero(nearer) > LEAST_MERGED * len(points)
+        nearer &= np.count_nonzero(nearer) > THINNER.least_merged * len(points)
         kept, swallowed = kept[nearer], swallowed[nearer]
         swap = mass[kept] < mass[swallowed]
         return np.where(swap, swallowed, kept), np.where(swap, kept, swallowed)
@@ -145,11 +154,11 @@ def spacing_enough(points: np.ndarray, neighbours: np.ndarray, spread: np.ndarra
     disc = np.sqrt(4 * np.pi * np.sqrt(spread[:, 1] * spread[:, 2])) / k
     spacing = np.maximum(disc, np.sqrt(12 * spread[:, 2] / k) / k)
     average = mean_over(neighbours)
-    bent = 1 / (np.maximum(points_around(points, average, spread), LEAST_AROUND) * np.maximum(spacing, TINY))
-    for _ in range(SMOOTHING):
+    bent = 1 / (np.maximum(points_around(points, average, spread), THINNER.least_around) * np.maximum(spacing, TINY))
+    for _ in range(THINNER.smoothing):
         bent = average @ bent
-    among = np.minimum(1 / (max(around, 1) * np.maximum(bent, TINY)), np.sqrt(spacing @ spacing / ENOUGH))
-    return np.minimum(np.sqrt(PACKED) * among, 2 * spacing)
+    among = np.minimum(1 / (max(around, 1) * np.maximum(bent, TINY)), np.sqrt(spacing @ spacing / POINTS.enough))
+    return np.minimum(np.sqrt(THINNER.packed) * among, 2 * spacing)
 
 
 def points_around(points: np.ndarray, average: csr_array, spread: np.ndarray) -> np.ndarray:
@@ -166,13 +175,15 @@ def points_around(points: np.ndarray, average: csr_array, spread: np.ndarray) ->
     but noise is seen.
     """
     k = average.nnz // len(points)
-    wider = principal_parts(wide_covariances(points, lambda values: average @ values, WIDER_STEPS)[0])[0]
+    wider = principal_parts(wide_covariances(points, lambda values: average @ values, THINNER.wider_steps)[0])[0]
     near = np.maximum(spread.T / k, TINY)
-    sheet = np.clip(wider[1] / (SHEET_FROM * np.maximum(wider[2], TINY)), 0, 1)  # rounding leaves less than nothing
+    sheet = np.clip(
+        wider[1] / (THINNER.sheet_from * np.maximum(wider[2], TINY)), 0, 1
+    )  # rounding leaves less than nothing
     bent = np.maximum(wider[0] - near[0], 0) / np.maximum((wider[2] / near[2]) ** 2 - 1, TINY)
     bent = sheet * bent + (1 - sheet) * np.maximum(wider[0], 0)
     with np.errstate(divide="ignore"):
-        return WIDER_BIAS * np.sqrt(np.pi * k / 4 * near[2] / bent)
+        return THINNER.wider_bias * np.sqrt(np.pi * k / 4 * near[2] / bent)
 
 
 def mean_over(neighbours: np.ndarray) -> csr_array:

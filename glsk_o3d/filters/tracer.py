@@ -9,7 +9,7 @@ import numpy as np
 from ..curve.curve import Curve
 from ..curve.diagnostics import measured
 from ..curve.sampling import along_a_morton_curve, on_points
-from ..curve.thin.detect import LEAST_SURFACE, may_lack_surface
+from ..curve.thin.detect import THIN, may_lack_surface
 from ..curve.thin.trace import trace
 from ..data.skeleton import Skeleton
 from ..geometry.vectors import AXES
@@ -45,7 +45,7 @@ class Tracer(Filter[Skeleton, Skeleton]):
     """
 
     surface: float = parameter(
-        LEAST_SURFACE,
+        THIN.least_surface,
         "Share of points with a surface below which a region is traced as paths. 0 traces none.",
         low=0,
         high=1,

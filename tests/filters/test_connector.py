@@ -71,11 +71,11 @@ def test_surface_is_told_by_what_had_a_ring_and_by_noise():
     clean, noisy = samples.tube(n=6000).points, samples.tube(n=1500).points + [0, 0, 3]
     points = np.concatenate([clean, noisy + rng.normal(scale=0.04, size=noisy.shape)])
     begun = pipelines.rings()(points)
-    assert (begun.noise[begun.representative_of_point[6000:]] > 0).mean() > 0.9
+    assert (begun.noise[begun.map.row_of_point[6000:]] > 0).mean() > 0.9
     state = Contractor(reducer=LPRReducer(), max_iterations=3)(begun)
     assert len(state) < len(begun)
     told = Connector()(state).surface_points
-    spoilt = np.flatnonzero(begun.sampled & (begun.noise[begun.representative_of_point] > 0))
-    np.testing.assert_array_equal(told, np.union1d(begun.point_of_survivor, spoilt))
+    spoilt = np.flatnonzero(begun.map.sampled & (begun.noise[begun.map.row_of_point] > 0))
+    np.testing.assert_array_equal(told, np.union1d(begun.map.point_of_survivor, spoilt))
     assert (told < 6000).sum() < 4000 < 6000
     assert np.isin(told, Connector()(state).supporting_points).all()

@@ -50,7 +50,7 @@ def test_one_pass_by_its_definition(share):
 
 def in_order(points):
     """The working cloud in the user's order and units."""
-    return points.frame.out_of(points.cloud)[points.representative_of_point]
+    return points.frame.out_of(points.cloud)[points.map.row_of_point]
 
 
 @pytest.mark.parametrize("noise", [0.04, 0.06])
@@ -81,7 +81,7 @@ def test_dense_noisy_clouds_are_averaged():
     sample = samples.torus(20000, noise=noise)
     state = (PREPARED | RingBuilder())(sample.points)
     assert 4096 <= len(state.cloud) < 8192 + 400
-    assert state.report.n_distinct == state.report.n_input - state.report.n_outliers == state.sampled.sum()
+    assert state.report.n_distinct == state.report.n_input - state.report.n_outliers == state.map.sampled.sum()
     assert state.mass.mean() == pytest.approx(1, rel=1e-12)
     alone = to_ridges(OutlierRemover()(sample.points), 4)
 

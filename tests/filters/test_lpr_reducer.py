@@ -86,24 +86,24 @@ def test_bookkeeping_of_a_pass(state, reducer):
     assert set(after.survivors.tolist()) < set(state.survivors.tolist())
     assert (np.diff(after.survivors) > 0).all()
     # the owners are total, and a survivor owns itself
-    assert after.representative.shape == (state.report.n_distinct,)
-    np.testing.assert_array_equal(np.unique(after.representative), np.arange(len(after)))
-    np.testing.assert_array_equal(after.representative[after.survivors], np.arange(len(after)))
+    assert after.map.survivor_of_row.shape == (state.report.n_distinct,)
+    np.testing.assert_array_equal(np.unique(after.map.survivor_of_row), np.arange(len(after)))
+    np.testing.assert_array_equal(after.map.survivor_of_row[after.survivors], np.arange(len(after)))
     # a point that stayed keeps its place, and takes in at most one other survivor
     at = np.searchsorted(state.survivors, after.survivors)
     for name in ("positions", "previous", "laplacian_coordinates"):
         np.testing.assert_array_equal(getattr(after, name), getattr(state, name)[at], err_msg=name)
-    new_representative = after.representative[state.survivors]
+    new_representative = after.map.survivor_of_row[state.survivors]
     assert np.bincount(new_representative).max() == 2
     # who was owned together stays together
-    np.testing.assert_array_equal(after.representative, new_representative[state.representative])
+    np.testing.assert_array_equal(after.map.survivor_of_row, new_representative[state.map.survivor_of_row])
     # every merge joins a point and its nearest ring neighbour, and pays
     swallowed = np.setdiff1d(np.arange(len(state)), at)
     representatives = at[new_representative[swallowed]]
     np.testing.assert_array_equal(state.rings.nearest(state.positions)[0][representatives], swallowed)
     assert (merge_energy(state)[representatives] < reducer.phi * state.ring_size[representatives] ** 2).all()
     if reducer.conserve_mass:  # and ring sizes are those of the rings as they are now
-        np.testing.assert_array_equal(after.mass, np.bincount(after.representative))
+        np.testing.assert_array_equal(after.mass, np.bincount(after.map.survivor_of_row))
         s0, s = (after.rings.nearest(places)[1] for places in (after.cloud[after.survivors], after.positions))
     else:  # as before the merges
         np.testing.assert_array_equal(after.mass, 1)

@@ -89,10 +89,10 @@ def test_what_is_left_is_the_cloud_without_them(outliers):
     np.testing.assert_array_equal(state.neighbours, clean.neighbours)
     assert state.frame.diagonal == pytest.approx(clean.frame.diagonal, rel=1e-15)
     kept = order < 600
-    np.testing.assert_array_equal(state.representative_of_point[kept], clean.representative_of_point[order[kept]])
+    np.testing.assert_array_equal(state.map.row_of_point[kept], clean.map.row_of_point[order[kept]])
     # outliers go with the nearest point that is none
     nearest = cKDTree(TORUS).query(mixed[~kept])[1]
-    np.testing.assert_array_equal(state.representative_of_point[~kept], clean.representative_of_point[nearest])
+    np.testing.assert_array_equal(state.map.row_of_point[~kept], clean.map.row_of_point[nearest])
 
 
 def veiled(points, share, seed=0, reach=0.3, across=0.01):

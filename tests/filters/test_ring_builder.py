@@ -15,7 +15,7 @@ SHEET = samples.sheet(n=500, bend=0).points
 
 def named_rings(state):
     """For every distinct input point, by its first index: (ring in such indices, closed), from its least entry on."""
-    name = state.point_of_survivor
+    name = state.map.point_of_survivor
     rings = {}
     for i, point in enumerate(name.tolist()):
         row = name[state.rings[i]].tolist()

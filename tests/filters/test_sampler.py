@@ -28,7 +28,7 @@ TORUS = samples.torus(n=600).points
 
 def in_order(points):
     """The working cloud in the user's order and units."""
-    return points.frame.out_of(points.cloud)[points.representative_of_point]
+    return points.frame.out_of(points.cloud)[points.map.row_of_point]
 
 
 def test_a_filter_of_points_takes_a_cloud_too():
@@ -46,18 +46,18 @@ def test_a_large_cloud_is_sampled_and_every_point_has_its_place():
     state = (prepared | RingBuilder())(points)
     assert 800 < state.report.n_sampled < 3 * 1600
     assert state.report.n_contracted <= 800
-    assert state.sampled.sum() == state.report.n_distinct
-    assert (state.representative_of_point[17], state.outlier[4000]) == (-1, True)
-    assert not state.sampled[[17, 4000]].any()
+    assert state.map.sampled.sum() == state.report.n_distinct
+    assert (state.map.row_of_point[17], state.outlier[4000]) == (-1, True)
+    assert not state.map.sampled[[17, 4000]].any()
     away = np.linalg.norm(in_order(state) - points, axis=1)
-    assert away[state.sampled].max() < 1e-12
+    assert away[state.map.sampled].max() < 1e-12
     assert np.delete(away, [17, *np.flatnonzero(state.outlier)]).max() < 0.1
     skeleton = (Contractor(reducer=LPRReducer()) | Connector() | Refiner())(state)
     assert skeleton.n_loops == 1
     assert (skeleton.vertex_of_point >= 0).sum() == 7999
-    assert len(skeleton.supporting_points) == state.sampled.sum()
+    assert len(skeleton.supporting_points) == state.map.sampled.sum()
     # who says where the surface is has a normal, nobody else
-    np.testing.assert_array_equal(np.isfinite(skeleton.normals[:, 0]), state.sampled)
+    np.testing.assert_array_equal(np.isfinite(skeleton.normals[:, 0]), state.map.sampled)
 
 
 PIPE = o3d.geometry.TriangleMesh.create_cylinder(0.8, 47, resolution=24, split=1)

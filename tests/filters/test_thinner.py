@@ -94,12 +94,12 @@ def test_thinned_clouds_keep_all_points_and_their_mass():
     assert len(state) == n == state.report.n_contracted < len(whole) == 2000
     assert state.report.n_sampled == state.report.n_distinct == 2000
     assert len(Thinner(thin_to="all")(points)) == 2000
-    assert state.sampled.all()
+    assert state.map.sampled.all()
     np.testing.assert_array_equal(state.cloud, whole.cloud)
     np.testing.assert_array_equal(state.normals, whole.normals)
     np.testing.assert_array_equal(state.positions, state.cloud[state.survivors])
-    np.testing.assert_array_equal(state.representative[state.survivors], np.arange(n))
-    np.testing.assert_allclose(state.mass, np.bincount(state.representative) * n / 2000, rtol=1e-14)
+    np.testing.assert_array_equal(state.map.survivor_of_row[state.survivors], np.arange(n))
+    np.testing.assert_allclose(state.mass, np.bincount(state.map.survivor_of_row) * n / 2000, rtol=1e-14)
     skeleton = (Contractor(reducer=LPRReducer()) | Connector() | Refiner())(state)
     assert len(skeleton.vertex_of_point) == 2000
     assert skeleton.n_loops == 1

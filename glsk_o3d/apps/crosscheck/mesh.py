@@ -47,7 +47,7 @@ def mesh_state(solid: Solid) -> tuple[Contraction, np.ndarray]:
     """A mesh as a contraction about to start from its medial places, and the faces over its positions."""
     igl = require("igl")
     state: Contraction = (Sampler(size="all", frame="spread") | RingBuilder())(solid.vertices)
-    corners = state.representative_of_point[solid.faces]
+    corners = state.map.row_of_point[solid.faces]
     corners = corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)]  # near vertices may have become one
     survivors, faces = np.unique(corners, return_inverse=True)
     positions, faces = state.cloud[survivors], faces.reshape(-1, 3)
@@ -56,8 +56,7 @@ def mesh_state(solid: Solid) -> tuple[Contraction, np.ndarray]:
     places, trust = mean_places(positions, normals, rings, *inscribed_balls(positions, normals))
     begun = replace(
         state,
-        survivors=survivors,
-        representative=cKDTree(positions).query(state.cloud)[1],
+        map=replace(state.map, survivors=survivors, survivor_of_row=cKDTree(positions).query(state.cloud)[1]),
         mass=np.maximum(area / area.mean(), LEAST_MASS),
         **at_rest(positions, rings),
     )

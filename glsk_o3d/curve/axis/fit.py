@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -10,29 +11,41 @@ from scipy.sparse import bsr_array, csc_array
 
 from ...geometry.groups import group_sum
 from ...geometry.neighbourhoods import nearest_neighbours
+from ...geometry.numbers import derived, fitted, measured, precision
 from ...geometry.polylines import incident_edges, nearest_on_edges, places_on_edges
 from ...geometry.radii import plane_distance_radii, robust_radii
 from ...geometry.solver import factorised
 from ...geometry.vectors import COLUMNS, FULL, ROWS, TINY, Floats, Ints, box, cross, dot, norm, unit
 from ..curve import Curve
+from ..numbers import CURVE
 from ..surface import Surface
 from .sections import Sections, half_axes, normal_moments
 
-FIT_DIFFUSION = 0.6  # fitted: length over which the places of points are smoothed on the surface, over the half width
-FIT_SPREAD = 2**0.5  # fitted: half width where normals say nothing, over that of the points; 1 lets noise bend it
-FIT_WIDEST = 10.0  # fitted: half width over the spacing of the vertices, at most: those in one place have none
-FIT_STAY = 0.1  # fitted: weight of staying where it was, per point; of a junction, over that of one line
-FIT_CENTROID = 0.5  # fitted: weight of the points themselves where their normals say nothing
-# derived: share of the squared normals of a quarter of a tube that stand across the others: of less, they do not say
-FIT_OPEN = 1 / 2 - 1 / np.pi  # how deep behind them the axis is; of half a tube it is .5
-FIT_SIDES = 20.0  # fitted: weight of the sides of a flat section; with 10 and 30 the scores are the same
-FIT_WALK = 3  # measured: vertices by which a point may move along the curve in a pass
-# derived: over the diagonal, how far out of the box of its points an axis may be: they show a third of a tube at least,
-FIT_BEYOND = 0.05  # whose axis is half a radius away from it, and a tube that is seen so is some ten radii long
-HALF_SUPPORT = 8  # fitted: points that support a vertex half; an edge has a piece for so many, begun ones counted
-# the axis of half a tube is 2 / pi radii away from the mean of its points, which scatter around that by their standard
-# deviation; no axis is farther off
-HALF_TUBE_REACH = (2 / np.pi) / np.sqrt(1 - (2 / np.pi) ** 2)
+
+@dataclass(frozen=True)
+class FitNumbers:
+    """Numbers of `fit_axis`."""
+
+    diffusion: float = fitted(0.6, "length over which places are smoothed on the surface, over the half width")
+    spread: float = fitted(2**0.5, "half width where normals say nothing, over that of the points")
+    widest: float = fitted(10.0, "most half width over the spacing of the vertices, which may be in one place")
+    centroid: float = fitted(0.5, "weight of the points themselves where their normals say nothing")
+    open: float = derived(
+        1 / 2 - 1 / np.pi, "share of the squared normals of a quarter of a tube that stand across the others"
+    )
+    sides: float = fitted(20.0, "weight of the sides of a flat section; 10 and 30 are as good")
+    walk: int = measured(3, "vertices by which a point may move along the curve in a pass")
+    beyond: float = derived(
+        0.05, "how far out of the box of its points an axis may be, over the diagonal: they show a third of it"
+    )
+    half_tube: float = derived(
+        (2 / np.pi) / np.sqrt(1 - (2 / np.pi) ** 2),
+        "distance of the axis of half a tube from the mean of its points, over their scatter",
+    )
+    held: float = precision(1e-3, "share of the mean number of points that holds vertices without points")
+
+
+FIT = FitNumbers()
 
 
 def pull_back_detached(curve: Curve) -> Curve:
@@ -44,7 +57,7 @@ def pull_back_detached(curve: Curve) -> Curve:
     count = np.maximum(cloud.count, 1)
     mean = group_sum(cloud.offset, cloud.vertex, m) / count[:, None]
     spread = group_sum((cloud.points - (curve.vertices + mean)[cloud.vertex]) ** 2, cloud.vertex, m).sum(axis=1)
-    reach, away = HALF_TUBE_REACH * np.sqrt(spread / count), norm(mean)
+    reach, away = FIT.half_tube * np.sqrt(spread / count), norm(mean)
     back = 1 - np.minimum(reach, away) / np.maximum(away, TINY)
     return curve.changed(vertices=curve.vertices + back[:, None] * mean)
 
@@ -100,7 +113,7 @@ def fit_axis(curve: Curve, passes: int, surface: Surface | None = None, settle: 
         width = curve.half_width if settle else _nearest(x, ends, *onto, p, n, curve.radii).width
     for again in range(passes):
         onto = nearest_on_edges(x, ends, edges_at[vertex], p) if again else onto
-        place = smooth(places_on_edges(x, ends, *onto), FIT_DIFFUSION * width[vertex])
+        place = smooth(places_on_edges(x, ends, *onto), FIT.diffusion * width[vertex])
         vertex, edge, t = _walked(x, ends, edges_at, vertex, place)
         near = _nearest(x, ends, edge, t, p, n, curve.radii, sides=settle)
         x, width = _solve(x, near, p, pattern, settle), near.width
@@ -114,9 +127,9 @@ def fit_axis(curve: Curve, passes: int, surface: Surface | None = None, settle: 
         equal = np.where(near.support > 0, near.sections.radius, radii)
         radii = robust_radii(equal, norm(near.offset), near.doubt, n, vertex)
     doubt = np.minimum(near.doubt, _flat_doubt(near, spacing)) if passes and settle else near.doubt
-    confidence = (1 - doubt) * near.support / (near.support + HALF_SUPPORT)
-    made = dict(vertices=x + centre, confidence=confidence, radii=radii, vertex_of_point=owner)
-    return curve.changed(**made, half_width=near.width, half_thickness=near.sections.half_thickness)
+    confidence = (1 - doubt) * near.support / (near.support + CURVE.half_support)
+    fields = dict(vertices=x + centre, confidence=confidence, radii=radii, vertex_of_point=owner)
+    return curve.changed(**fields, half_width=near.width, half_thickness=near.sections.half_thickness)
 
 
 def _walked(
@@ -125,7 +138,7 @@ def _walked(
     """The vertex near each place, a few steps from the one it had; and the nearest edge there, and where on it."""
     vertex, going = vertex.copy(), np.arange(len(place))
     edge, t = nearest_on_edges(x, ends, edges_at[vertex], place)
-    for _ in range(FIT_WALK):  # only what got to another vertex is asked again
+    for _ in range(FIT.walk):  # only what got to another vertex is asked again
         ahead = ends[edge[going], (t[going] > 0.5).astype(int)]
         on = ahead != vertex[going]
         going = going[on]
@@ -159,7 +172,7 @@ def _smoother(surface: Surface, points: np.ndarray, p: np.ndarray) -> Callable[[
 def axis_box(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest coordinates, (3,), that an axis of points, (n, 3) float array, n > 0, may have."""
     low, high = box(points)
-    slack = FIT_BEYOND * np.linalg.norm(high - low)
+    slack = FIT.beyond * np.linalg.norm(high - low)
     return low - slack, high + slack
 
 
@@ -187,10 +200,10 @@ def _nearest(
     share, tangent = np.column_stack([1 - t, t]), unit(x[ends[:, 1]] - x[ends[:, 0]])
     along = tangent.take(edge, axis=0)
     across, offset = cross(n, along), places_on_edges(x, ends, edge, t) - p
-    miss, apart = dot(across, offset) ** 2, dot(offset, offset) - dot(offset, along) ** 2
+    miss, distance = dot(across, offset) ** 2, dot(offset, offset) - dot(offset, along) ** 2
     a, b = ends.T
     aside = offset - dot(offset, along)[:, None] * along
-    facts = [miss, apart, np.full(len(p), 0.5), normal_moments(n, offset), aside[:, ROWS] * aside[:, COLUMNS]]
+    facts = [miss, distance, np.full(len(p), 0.5), normal_moments(n, offset), aside[:, ROWS] * aside[:, COLUMNS]]
     if sides:
         inward = dot(n, offset)[:, None]
         facts += [-np.sign(inward) * n, -inward * n, inward**2 * facts[3][:, :6]]
@@ -204,7 +217,7 @@ def _nearest(
     doubt = np.where(apart_at > 0, np.minimum(2 * miss_at, apart_at) / np.maximum(apart_at, TINY), 1)
     # normals of a sheet as thin as its points are apart say nothing of its width, and there is nothing but doubt
     spread = _spread_width(at[:, 15:21] / np.maximum(2 * support, TINY)[:, None])
-    width = sections.half_width + doubt * np.maximum(FIT_SPREAD * spread - sections.half_width, 0)
+    width = sections.half_width + doubt * np.maximum(FIT.spread * spread - sections.half_width, 0)
     return _Nearest(edge, share, tangent, across, offset, doubt, support, sections, width, at[:, 3:9], at[:, 21:])
 
 
@@ -212,8 +225,8 @@ def _pull(near: _Nearest) -> np.ndarray:
     """K of `fit_axis` at every vertex, (m, 3, 3)."""
     share, axes = np.linalg.eigh(near.faces[:, FULL])
     across = share[:, 1] / np.maximum(share[:, 1:].sum(axis=1), TINY)
-    face = np.maximum(1 - across / FIT_OPEN, 0)[:, None] * axes[:, :, 2]
-    pull: np.ndarray = FIT_CENTROID * near.doubt[:, None, None] * np.eye(3) + face[:, :, None] * axes[:, None, :, 2]
+    face = np.maximum(1 - across / FIT.open, 0)[:, None] * axes[:, :, 2]
+    pull: np.ndarray = FIT.centroid * near.doubt[:, None, None] * np.eye(3) + face[:, :, None] * axes[:, None, :, 2]
     return pull
 
 
@@ -236,8 +249,8 @@ def _middle(near: _Nearest) -> tuple[np.ndarray, np.ndarray]:
         flat *= np.clip(2 - squares / np.maximum(np.maximum(half**2 * normals, squares / 2), TINY), 0, 1) ** 2
     seen = sums[0, 0]
     firm = flat * np.maximum(seen - np.abs(odd), 0)
-    way = flat * seen * (distant - width * odd) / np.maximum(seen + np.abs(odd), TINY)
-    return firm, np.clip(way, -firm * width, firm * width)
+    offset = flat * seen * (distant - width * odd) / np.maximum(seen + np.abs(odd), TINY)
+    return firm, np.clip(offset, -firm * width, firm * width)
 
 
 def _sides_and_faces(near: _Nearest) -> np.ndarray:
@@ -305,12 +318,14 @@ def _solve(x: np.ndarray, near: _Nearest, p: np.ndarray, pattern: _Pattern, sett
     facts = group_sum(facts, ends.T.ravel(), m)
     right, count = facts[:, :3], facts[:, 3]
     along = facts[:, 4:].reshape(m, 3, 3) / np.maximum(np.bincount(ends.ravel(), minlength=m), 1)[:, None, None]
-    stay = (FIT_STAY * count + 1e-3 * max(count.mean(), 1))[:, None, None] * np.eye(3) + count[:, None, None] * along
+    stay = (CURVE.stay * count + FIT.held * max(count.mean(), 1))[:, None, None] * np.eye(3) + count[
+        :, None, None
+    ] * along
     right = right + np.einsum("nij,nj->ni", stay, x)
     if settle:
-        (firm, way), across = _middle(near), near.sections.across
-        stay = stay + FIT_SIDES * firm[:, None, None] * across[:, :, None] * across[:, None]
-        right = right + FIT_SIDES * (firm * dot(across, x) + way)[:, None] * across
+        (firm, offset), across = _middle(near), near.sections.across
+        stay = stay + FIT.sides * firm[:, None, None] * across[:, :, None] * across[:, None]
+        right = right + FIT.sides * (firm * dot(across, x) + offset)[:, None] * across
 
     reach = np.linalg.norm(x[beside] - x[inner, None], axis=2)
     chord = reach[:, ::-1] / np.maximum(reach.sum(axis=1, keepdims=True), TINY)
@@ -318,7 +333,7 @@ def _solve(x: np.ndarray, near: _Nearest, p: np.ndarray, pattern: _Pattern, sett
     squared = np.maximum(reach.prod(axis=1), TINY)
     flat = near.sections.half_thickness / np.maximum(near.sections.half_width, TINY) if settle else np.ones(m)
     half = np.stack([near.width, near.width * flat])[:, inner]
-    half = np.minimum(half**2, FIT_WIDEST**2 * squared) / squared
+    half = np.minimum(half**2, FIT.widest**2 * squared) / squared
     wide, thin = np.maximum(count[inner], 1) * half**2
     normal = unit(cross(x[beside[:, 1]] - x[beside[:, 0]], near.sections.across[inner]))
     stiff = wide[:, None, None] * np.eye(3) + (thin - wide)[:, None, None] * normal[:, :, None] * normal[:, None]

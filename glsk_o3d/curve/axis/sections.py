@@ -63,8 +63,6 @@ class VertexPoints:
         return Members(self.vertex, len(self.graph.vertices))
 
 
-# fitted: radii that a tangent plane passes by the sphere or section that it should touch, where its point counts half
-SURFACE_FIT = 0.25
 LEAST_SHARE = 1e-5  # precision: of the squared normals, above which they tell a direction: 1/300 of a radian
 
 
@@ -98,9 +96,9 @@ def measure_sections(graph: Graph, cloud: VertexPoints) -> Sections:
     m, (a, b) = len(graph.vertices), graph.edges.T
     sums = group_sum(normal_moments(cloud.normals, cloud.offset), cloud.vertex, m)
     sums = sums + group_sum(sums[np.concatenate([b, a])], np.concatenate([a, b]), m)
-    found = half_axes(sums, graph.radii)
-    wide, thick = (np.where(cloud.count == 0, graph.radii, half) for half in found[:2])
-    return Sections(wide, thick, found.across)
+    halves = half_axes(sums, graph.radii)
+    wide, thick = (np.where(cloud.count == 0, graph.radii, half) for half in halves[:2])
+    return Sections(wide, thick, halves.across)
 
 
 def normal_moments(normals: np.ndarray, offset: np.ndarray) -> np.ndarray:
@@ -123,9 +121,9 @@ def half_axes(moments: np.ndarray, otherwise: np.ndarray) -> Sections:
     plane = axes[:, :, 1:] / np.sqrt(np.where(known, share[:, 1:], 1))[:, None]
     reach = plane.transpose(0, 2, 1) @ moments[:, 6:][:, FULL] @ plane
     unseen = np.where(np.isnan(otherwise), 0, otherwise)
-    one, other = (np.where(seen, reach[:, i, i], unseen) for i, seen in enumerate(known.T))
-    mean, lean, both = (one + other) / 2, (one - other) / 2, np.where(known.all(axis=1), reach[:, 0, 1], 0)
-    apart, turn = np.hypot(lean, both), np.arctan2(both, lean)[:, None] / 2
+    first, second = (np.where(seen, reach[:, i, i], unseen) for i, seen in enumerate(known.T))
+    mean, lean, both = (first + second) / 2, (first - second) / 2, np.where(known.all(axis=1), reach[:, 0, 1], 0)
+    difference, turn = np.hypot(lean, both), np.arctan2(both, lean)[:, None] / 2
     across = unit(np.cos(turn) * plane[:, :, 0] + np.sin(turn) * plane[:, :, 1])
     # rounding may leave less than nothing
-    return Sections(np.maximum(mean + apart, 0), np.maximum(mean - apart, 0), across)
+    return Sections(np.maximum(mean + difference, 0), np.maximum(mean - difference, 0), across)

@@ -5,7 +5,7 @@ import numpy as np
 from ...geometry.polylines import incident_edges
 from ...geometry.vectors import TINY, dot, norm
 from ..curve import Curve
-from .fit import HALF_SUPPORT
+from ..numbers import CURVE
 
 SUBDIVISION_CHUNK = 65536  # speed: points at a time: memory stays flat
 
@@ -19,7 +19,7 @@ def subdivide_edges(curve: Curve, spacing: float) -> Curve:
     half = curve.sections.radius[ends].mean(axis=1)
     length = np.maximum(spacing * half, np.maximum(1e-3 * curve.edge_lengths, TINY))
     points = (curve.cloud.mass / np.maximum(curve.degree, 1))[ends].sum(axis=1)
-    most = np.maximum(points / HALF_SUPPORT, 1)
+    most = np.maximum(points / CURVE.half_support, 1)
     pieces = np.ceil(np.clip(curve.edge_lengths / length, 1, most)).astype(int)  # also edges of no length are one
     inner = pieces - 1
     edge = np.repeat(np.arange(len(ends)), inner)

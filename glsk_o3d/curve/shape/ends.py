@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -10,30 +11,37 @@ from scipy.spatial import cKDTree
 
 from ...geometry.groups import Members, quantile
 from ...geometry.neighbourhoods import plane_axes
+from ...geometry.numbers import derived, fitted, measured
 from ...geometry.polylines import arc_lengths, place_at
 from ...geometry.vectors import TINY, Floats, cross, dot, norm, unit
 from ..axis.fit import axis_box
 from ..axis.sections import VertexPoints
 from ..curve import Curve
-from ..limbs import AXIS_LENGTH
+from ..numbers import CURVE
 
-END_CUT = 1.75  # fitted: distance from where the points stop, in larger half widths, within which a cap bends the curve
-END_SIZE = 4.0  # fitted: radii behind the cut over which it is seen how wide a limb is, and how fast it gets thinner
-END_REACH = 0.98  # fitted: share of an end's points within its reach: normals and noise throw the others farther
-END_BENDING = 0.5  # fitted: weight of going straight on, twice lambda
-END_ROUNDS = 3  # measured: from then on hardly anything moves
-END_POINTS = 4  # derived: fewer cannot say where a limb turns
-END_THINNER = 2 / 3  # measured: over its limb's radius, that of a neck at most; a round cap seems to have .85 of it
-END_SIDES = 1 / 3  # derived: share of the last points that are sides, at least; 2/3 at a flat end, none on its face
-ONE_SIDED = 1 / np.pi  # derived: radii from the axis to the mean of points around it, between half a tube's and none
-CURVE_SAMPLES = 64  # derived: places along a parabola that say its length to 1e-3 of the whole
-WAY_SAMPLES = 16  # derived: places along a run that say its direction, several on each of its few edges
-# For points weighted by the cube of c, the cosine of their normals with the axis: on a round cap of radius 1, where c
-# is the height over its centre and every height has the same area,
-CAP_POWER = 3  # fitted: the power; lower ones let the sides have a say
-ROUND_MEAN = 4 / 5  # derived: mean height,
-ROUND_VARIANCE = 2 / 75  # derived: its variance,
-ROUND_AREA = 1 / 2  # derived: and the weight over that of a flat cap
+
+@dataclass(frozen=True)
+class EndNumbers:
+    """Numbers of `regrow_ends`."""
+
+    cut: float = fitted(1.75, "half widths from where the points stop, within which a cap bends the curve")
+    size: float = fitted(4.0, "radii behind the cut that show how wide a limb is, and how it tapers")
+    reach: float = fitted(0.98, "share of an end's points within its reach: noise throws the others farther")
+    bending: float = fitted(0.5, "weight of going straight on, twice lambda")
+    rounds: int = measured(3, "rounds; from then on hardly anything moves")
+    points: int = derived(4, "points; fewer cannot say where a limb turns")
+    thinner: float = measured(2 / 3, "most radius of a neck over its limb's; a round cap seems to have .85")
+    sides: float = derived(1 / 3, "least share of sides among the last points: 2/3 at a flat end, none on its face")
+    one_sided: float = derived(1 / np.pi, "radii from the axis to the mean of points around it: of half a tube more")
+    curve_samples: int = derived(64, "places along a parabola that say its length to 1e-3")
+    direction_samples: int = derived(16, "places along a run that say its direction")
+    cap_power: int = fitted(3, "power of c, the cosine of normals with the axis, by which points of a cap count")
+    round_mean: float = derived(4 / 5, "mean of c on a round cap of radius 1, where all heights have the same area")
+    round_variance: float = derived(2 / 75, "variance of c on a round cap")
+    round_area: float = derived(1 / 2, "sum of the weights of a round cap over that of a flat one")
+
+
+END = EndNumbers()
 
 
 def regrow_ends(curve: Curve, to_surface: bool = False) -> Curve:
@@ -58,7 +66,7 @@ def regrow_ends(curve: Curve, to_surface: bool = False) -> Curve:
     """
     if not len(curve.leaves):
         return curve
-    grown = [found for end in _ends(curve) if (found := _grow(curve, *end, to_surface))]
+    grown = [end_grown for end in _ends(curve) if (end_grown := _grow(curve, *end, to_surface))]
     return _replanted(curve, grown) if grown else curve
 
 
@@ -97,34 +105,34 @@ def _grow(curve: Curve, path: np.ndarray, first: int, other: bool, to_surface: b
     along = arc_lengths(places)
     last = _last(cloud, path, along, first, other)
     length = along[last]
-    run, cut, way = _within(along, length, END_SIZE * quantile(radii)), len(path), np.zeros(3)
+    run, cut, direction = _within(along, length, END.size * quantile(radii)), len(path), np.zeros(3)
     late = (length - along <= half_widths) & (other | (along >= half_widths))
     late[last + 1 :] = True
     stop = np.clip(along[np.argmax(late)] if late.any() else length, length / 2, length)
     for _ in range(2):  # how far the points reach is seen along a run that is no part of the cap itself
         radius, wide = quantile(radii[run]), quantile(half_widths[run])
-        start = max(stop - AXIS_LENGTH * radius, 0)
-        way, anchor = _way(places, along, start, stop), place_at(places, along, stop)
+        start = max(stop - CURVE.line_length * radius, 0)
+        direction, anchor = _way(places, along, start, stop), place_at(places, along, stop)
         # the points of a junction are other limbs', too
         own = cloud.members.of(path[max(np.searchsorted(along, start), 0 if other else 1) :])
-        if len(own) < END_POINTS:
+        if len(own) < END.points:
             return None
-        reach = quantile((cloud.points[own] - anchor) @ way, END_REACH)
-        close = ((places - anchor) @ way > reach - END_CUT * wide) | late
+        reach = quantile((cloud.points[own] - anchor) @ direction, END.reach)
+        close = ((places - anchor) @ direction > reach - END.cut * wide) | late
         close = np.flatnonzero(close & (along > start))
         cut = max(close[0] if len(close) else len(path), first)
         stop = along[cut - 1]
-        run = _within(along, stop, END_SIZE * radius)
+        run = _within(along, stop, END.size * radius)
     radius, anchor = quantile(radii[run]), places[cut - 1]
     if stop > radius / 2:  # of a stub there is no run: it goes on as it was
-        way = _way(places, along, max(stop - AXIS_LENGTH * radius, 0), stop)
+        direction = _way(places, along, max(stop - CURVE.line_length * radius, 0), stop)
     own = cloud.members.of(path[max(cut - 2, 0 if other else min(1, len(path) - 1)) :])
     points = cloud.points[own] - anchor
-    ahead = points @ way > 0
-    if ahead.sum() < END_POINTS:
+    ahead = points @ direction > 0
+    if ahead.sum() < END.points:
         return None
-    end = _End.of(points[ahead], cloud.normals[own[ahead]], way, radius)
-    behind = _within(along, stop, END_SIZE * radius)
+    end = _End.of(points[ahead], cloud.normals[own[ahead]], direction, radius)
+    behind = _within(along, stop, END.size * radius)
     tip = end.tip(_Taper.of(along[behind] - stop, radii[behind], radius), to_surface)
     steps = np.diff(along[run])
     step = quantile(steps) if len(steps) else length / last
@@ -143,8 +151,8 @@ def _last(cloud: VertexPoints, path: np.ndarray, along: np.ndarray, first: int, 
     count = cloud.count[path] * (other | (np.arange(len(path)) > 0))
     own = cloud.members.of(path[count > 0])
     thick = np.sqrt((cloud.offset[own] ** 2).sum() / max(len(own), 1))
-    some = np.cumsum(count[::-1])[::-1] > (1 - END_REACH) * len(own)
-    least = np.searchsorted(along, along[-1] - END_CUT * thick)
+    some = np.cumsum(count[::-1])[::-1] > (1 - END.reach) * len(own)
+    least = np.searchsorted(along, along[-1] - END.cut * thick)
     return int(min(max(np.flatnonzero(some).max(initial=0), least, first), len(path) - 1))
 
 
@@ -156,9 +164,9 @@ def _within(along: np.ndarray, stop: float, length: float) -> np.ndarray:
 
 def _way(places: np.ndarray, along: np.ndarray, start: float, stop: float) -> np.ndarray:
     """Direction of a path from one length along it to another, (3,) float array, by least squares."""
-    lengths = np.linspace(start, stop, WAY_SAMPLES)
-    way: Floats = (lengths - lengths.mean()) @ place_at(places, along, lengths)
-    return way / max(np.linalg.norm(way), TINY)
+    lengths = np.linspace(start, stop, END.direction_samples)
+    direction: Floats = (lengths - lengths.mean()) @ place_at(places, along, lengths)
+    return direction / max(np.linalg.norm(direction), TINY)
 
 
 class _Taper(NamedTuple):
@@ -175,7 +183,7 @@ class _Taper(NamedTuple):
         # a run shorter than its radius says nothing
         slope = (away @ radii) / spread if len(along) > 3 and np.ptp(along) > radius else 0.0
         slope = float(np.clip(slope, -1, 0))
-        return cls(radius * (1 + slope * AXIS_LENGTH / 2), slope)
+        return cls(radius * (1 + slope * CURVE.line_length / 2), slope)
 
     def at(self, length: float) -> float:
         return max(self.radius + self.slope * length, 0.0)
@@ -193,20 +201,20 @@ class _End(NamedTuple):
     along: np.ndarray  # (s,), and its length up to them
 
     @classmethod
-    def of(cls, points: np.ndarray, normals: np.ndarray, way: np.ndarray, radius: float) -> _End:
+    def of(cls, points: np.ndarray, normals: np.ndarray, direction: np.ndarray, radius: float) -> _End:
         """The curve through the origin in a direction that suits the points best."""
         turn = bend = np.zeros(3)
-        for _ in range(END_ROUNDS):  # the axis of the parabola is the limb behind: where this turns, so must the axis
-            way = unit((way + turn)[None])[0]
-            turn, bend = _turn_and_bend(points, normals, way, bend, radius)
-        step, way = points @ way, way + turn
+        for _ in range(END.rounds):  # the axis of the parabola is the limb behind: where this turns, so must the axis
+            direction = unit((direction + turn)[None])[0]
+            turn, bend = _turn_and_bend(points, normals, direction, bend, radius)
+        step, direction = points @ direction, direction + turn
         # the nearest place of the curve: one step of Newton from the one abreast, by a radius at most
-        slope = way + step[:, None] * bend
-        off = points - step[:, None] * way - (step**2 / 2)[:, None] * bend
+        slope = direction + step[:, None] * bend
+        off = points - step[:, None] * direction - (step**2 / 2)[:, None] * bend
         step = step + np.clip(dot(off, slope) / np.maximum(dot(slope, slope) - off @ bend, 0.5), -radius, radius)
-        steps = np.linspace(0, max(2 * step.max(), TINY), CURVE_SAMPLES)
-        along = arc_lengths(np.stack([steps, steps**2 / 2], axis=1) @ np.stack([way, bend]))
-        return cls(points, normals, way, bend, np.interp(step, steps, along), steps, along)
+        steps = np.linspace(0, max(2 * step.max(), TINY), END.curve_samples)
+        along = arc_lengths(np.stack([steps, steps**2 / 2], axis=1) @ np.stack([direction, bend]))
+        return cls(points, normals, direction, bend, np.interp(step, steps, along), steps, along)
 
     def curve(self, length: np.ndarray) -> np.ndarray:
         """Places so far ahead, (k, 3) float array."""
@@ -223,7 +231,7 @@ class _End(NamedTuple):
         Where its last points are much nearer to the axis than it is thick, as on the neck of a bottle, it has the cap
         of that thinner limb.
         """
-        reach, farthest = quantile(self.length, END_REACH), float(self.length.max())
+        reach, farthest = quantile(self.length, END.reach), float(self.length.max())
         if to_surface and 2 * taper.at(farthest) < taper.radius:  # hardly any points say where a cone has its apex
             return min(taper.radius / -taper.slope, farthest)
         return self._cap(self._thinner(taper, reach), reach, to_surface)
@@ -232,9 +240,9 @@ class _End(NamedTuple):
         """The limb of the last points, if they are much nearer to the axis than it is thick, and all around it."""
         radius = given = taper.at(reach - taper.radius)
         centre = np.zeros(3)
-        for _ in range(END_ROUNDS):
+        for _ in range(END.rounds):
             late = self.length > reach - radius
-            if late.sum() < END_POINTS:
+            if late.sum() < END.points:
                 break
             length = self.length[late]
             tangent = unit(self.slope(length))
@@ -242,12 +250,12 @@ class _End(NamedTuple):
             away = self.points[late] - self.curve(length)
             centre = away.mean(axis=0)
             sides = dot(normals, normals).sum()
-            if sides < END_SIDES * late.sum():
+            if sides < END.sides * late.sum():
                 return taper
             across = norm(normals) @ np.abs(dot(away, normals)) / max(sides, TINY)
             radius = min(radius, float(across))
-        around = np.linalg.norm(centre) < ONE_SIDED * radius
-        return _Taper(radius, 0.0) if around and radius < END_THINNER * given else taper
+        around = np.linalg.norm(centre) < END.one_sided * radius
+        return _Taper(radius, 0.0) if around and radius < END.thinner * given else taper
 
     def _cap(self, taper: _Taper, reach: float, to_surface: bool) -> float:
         """How far it is to half a radius inside a flat cap, or to the centre of a round one; or to the cap itself.
@@ -260,44 +268,46 @@ class _End(NamedTuple):
         """
         start = max(reach - taper.at(reach - taper.radius), 0.0)
         late = self.length > start
-        if late.sum() < END_POINTS:
+        if late.sum() < END.points:
             return reach if to_surface else max(reach - taper.at(reach) / 2, 0.0)
         length = self.length[late] - start
         tangent = self.slope(self.length[late])
         normals, points = self.normals[late], self.points[late] - self.curve(np.array([start]))
         outward = np.where(dot(normals, points) < 0, -1, 1) * dot(normals, tangent) / norm(tangent)
         # those of a cone lean outwards, too
-        cap = np.maximum(outward + taper.slope / np.hypot(1, taper.slope), 0) ** CAP_POWER
+        cap = np.maximum(outward + taper.slope / np.hypot(1, taper.slope), 0) ** END.cap_power
         side = np.maximum(1 - outward**2, 0)
         stop = 2 * (side @ length) / max(side.sum(), TINY)
         weight, radius = float(cap.sum()), taper.at(start + stop)
         mean = cap @ length / max(weight, TINY)
         variance = max(cap @ length**2 / max(weight, TINY) - mean**2, 0)
         # the cap of a tube has half a radius times the area of a unit of its length
-        owed = ROUND_AREA * side.sum() * taper.radius / (2 * max(stop, TINY))
+        owed = END.round_area * side.sum() * taper.radius / (2 * max(stop, TINY))
         seen = weight / max(owed, weight, TINY)
-        round_share = min(variance / max(ROUND_VARIANCE * radius**2, TINY), 1)
+        round_share = min(variance / max(END.round_variance * radius**2, TINY), 1)
         if to_surface:
-            tip = start + seen * (mean + (1 - ROUND_MEAN) * round_share * radius) + (1 - seen) * stop
+            tip = start + seen * (mean + (1 - END.round_mean) * round_share * radius) + (1 - seen) * stop
             return min(max(tip, 0.0), float(self.length.max()))
-        inside = (ROUND_MEAN - 1 / 2) * round_share
+        inside = (END.round_mean - 1 / 2) * round_share
         tip = start + seen * mean + (1 - seen) * stop - (1 / 2 + seen * inside) * radius
         return min(max(tip, 0.0), reach)
 
 
 def _turn_and_bend(
-    points: np.ndarray, normals: np.ndarray, way: np.ndarray, bend: np.ndarray, radius: float
+    points: np.ndarray, normals: np.ndarray, direction: np.ndarray, bend: np.ndarray, radius: float
 ) -> np.ndarray:
     """How a limb from the origin in a direction turns aside there, and how it bends, (2, 3) float array."""
-    length, across = points @ way, cross(normals, way)
+    length, across = points @ direction, cross(normals, direction)
     powers, miss = np.stack([length, length**2 / 2], axis=1), dot(across, points)
-    left = miss - powers[:, 1] * (across @ bend)
-    weight = (length <= quantile(length, END_REACH)) * radius**2 / (radius**2 + 4 * left**2 + TINY)
-    frame: Floats = plane_axes(way[None])[0].T
-    ask = (powers[:, :, None] * (across @ frame.T)[:, None]).reshape(-1, 4)
-    stiff = END_BENDING / 2 * (weight @ powers**2).repeat(2)
-    found: Floats = np.linalg.solve((weight[:, None] * ask).T @ ask + np.diag(stiff + TINY), (weight * miss) @ ask)
-    return found.reshape(2, 2) @ frame
+    residual = miss - powers[:, 1] * (across @ bend)
+    weight = (length <= quantile(length, END.reach)) * radius**2 / (radius**2 + 4 * residual**2 + TINY)
+    frame: Floats = plane_axes(direction[None])[0].T
+    rows = (powers[:, :, None] * (across @ frame.T)[:, None]).reshape(-1, 4)
+    stiff = END.bending / 2 * (weight @ powers**2).repeat(2)
+    solution: Floats = np.linalg.solve(
+        (weight[:, None] * rows).T @ rows + np.diag(stiff + TINY), (weight * miss) @ rows
+    )
+    return solution.reshape(2, 2) @ frame
 
 
 def _replanted(curve: Curve, grown: list[_Grown]) -> Curve:
@@ -307,7 +317,7 @@ def _replanted(curve: Curve, grown: list[_Grown]) -> Curve:
     keep, owner = np.ones(m, bool), curve.vertex_of_point.copy()
     low, high = axis_box(curve.points[curve.supporting_points])
     edges, known = [curve.edges], {name: [getattr(curve, name)] for name in ("radii", "confidence")}
-    planted = [np.clip(found.places, low, high) for found in grown]
+    planted = [np.clip(end.places, low, high) for end in grown]
     for (path, cut, _, run), places in zip(grown, planted, strict=True):
         gone, names = path[cut:], m + np.arange(len(places))
         m += len(places)

@@ -1,5 +1,6 @@
 """Follow handles to the body that they are on: those of a mug, a pot, a bucket."""
 
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -8,21 +9,29 @@ from scipy.spatial import cKDTree
 
 from ...geometry.cycles import edges_on_cycles
 from ...geometry.groups import quantile
+from ...geometry.numbers import derived, precision, speed
 from ...geometry.polylines import arc_lengths
 from ...geometry.vectors import TINY, Floats, Ints, cross, dot, norm, unit
-from ..axis.fit import FIT_STAY
-from ..axis.sections import SURFACE_FIT, half_axes, normal_moments
+from ..axis.sections import half_axes, normal_moments
 from ..curve import Curve
-from ..diagnostics import STUB_LENGTH
-from ..limbs import AXIS_LEAVES, AXIS_LENGTH, Line
-from .wide_ends import WIDE_NECK, half_widths
+from ..limbs import Line
+from ..numbers import CURVE
+from .wide_ends import half_widths
 
-HANDLE_STEP = 0.7  # precision: radii from one section to the next; with .3 and .5 the scores are the same
-HANDLE_OPEN = 2 / np.pi  # derived: length of the mean outward normal of half a tube; of more, nothing closes around it
-FLAT_BODY = 1e-6  # precision: of a body's squared half width, so that its ellipsoid can be inverted if it is flat
-HANDLE_POINTS = 4  # derived: fewer say nothing of a section
-HANDLE_TRIES = 4  # speed: places, each two radii farther away, from which a handle is followed until it meets the wall
-HANDLE_ROUNDS = 2  # precision: from then on hardly anything moves
+
+@dataclass(frozen=True)
+class HandleNumbers:
+    """Numbers of `Handles`."""
+
+    step: float = precision(0.7, "radii from one section to the next; with .3 and .5 the scores are the same")
+    open: float = derived(2 / np.pi, "mean outward normal of half a tube; of more, nothing closes around it")
+    flat: float = precision(1e-6, "share of a body's squared half width by which a flat one can be inverted")
+    points: int = derived(4, "points; fewer say nothing of a section")
+    tries: int = speed(4, "places from which a handle is followed until it meets the wall, two radii apart")
+    rounds: int = precision(2, "rounds; from then on hardly anything moves")
+
+
+HANDLE = HandleNumbers()
 
 
 class Body(NamedTuple):
@@ -46,7 +55,7 @@ class Handles:
 
         Such a body is the widest part of a branch, between two thin ones that are near each other.
         """
-        found: list[int] = []
+        middles: list[int] = []
         vertices, degree = self.curve.vertices, self.curve.degree
         for branch in self.curve.branches:
             if degree[branch[0]] == 2:  # a ring begins anywhere, but not in a body
@@ -55,19 +64,19 @@ class Handles:
                 branch = np.append(np.roll(ring, -thinnest), ring[thinnest])
             wide = self._width[branch]
             top = int(np.argmax(wide))
-            thin = np.flatnonzero((WIDE_NECK * wide <= wide[top]) & (self.cloud.count[branch] > 0))
+            thin = np.flatnonzero((CURVE.neck * wide <= wide[top]) & (self.cloud.count[branch] > 0))
             before, after = thin[thin < top], thin[thin > top]
             if not len(before) or not len(after):
                 continue
-            apart = np.linalg.norm(vertices[branch[after[0]]] - vertices[branch[before[-1]]])
+            distance = np.linalg.norm(vertices[branch[after[0]]] - vertices[branch[before[-1]]])
             body = branch[before[-1] + 1 : after[0]]
             own = self.cloud.members.of(body)
-            if apart > STUB_LENGTH * wide[top] or not len(own):
+            if distance > CURVE.stub * wide[top] or not len(own):
                 continue
             away = norm(vertices[body] - self.cloud.points[own].mean(axis=0))
             if away.min() < wide[top] / 2 and self.on_loop(branch):  # or the middle is that of a thick ring
-                found.append(body[away.argmin()])
-        return np.array(found, int)
+                middles.append(body[away.argmin()])
+        return np.array(middles, int)
 
     def body(self, paths: list[np.ndarray]) -> Body:
         """The body where some paths begin: as far along these as all vertices are at most their width away from there.
@@ -82,7 +91,7 @@ class Handles:
         own, wide = self.cloud.members.of(near), float(self._width[near].max(initial=0))
         points = self.cloud.points[own] if len(own) else vertices[paths[0][:1]]
         offset = points - points.mean(axis=0)
-        wall = 3 * offset.T @ offset / len(points) + FLAT_BODY * wide**2 * np.eye(3)
+        wall = 3 * offset.T @ offset / len(points) + HANDLE.flat * wide**2 * np.eye(3)
         return Body(points.mean(axis=0), wide, wall)
 
     @cached_property
@@ -102,25 +111,25 @@ class Handles:
         If it does not come to the wall, it is followed from farther away.
         """
         places, cloud = self.curve.vertices[path], self.cloud
-        thin = (WIDE_NECK * self._width[path] <= body.half_width) & (cloud.count[path] > 0)
+        thin = (CURVE.neck * self._width[path] <= body.half_width) & (cloud.count[path] > 0)
         run = np.flatnonzero(thin)
         if len(run):  # the first of several
             thick = np.flatnonzero(~thin[run[0] :] & (cloud.count[path[run[0] :]] > 0))
             run = run[run < run[0] + (thick[0] if len(thick) else len(path))]
         radius = quantile(self._sections.radius[path[run]]) if len(run) else 0.0
         size = np.maximum(self._sections.radius, cloud.distance)[path[run]]
-        run = run[size < AXIS_LEAVES * radius]
-        if len(run) < HANDLE_POINTS or not self.on_loop(path):
+        run = run[size < CURVE.undisturbed * radius]
+        if len(run) < HANDLE.points or not self.on_loop(path):
             return None
         along = arc_lengths(places)
         half_width, half_thickness = (quantile(half[path[run]]) for half in self._sections[:2])
         # the rest is followed from its own end, if that is one of the same body's; else it may be no handle there
         last = along[run].mean() if path[0] == path[-1] else min(along[run].mean(), along[-1] / 2)
-        away = along[run[0]] + AXIS_LENGTH * radius * np.arange(1, HANDLE_TRIES + 1)
+        away = along[run[0]] + CURVE.line_length * radius * np.arange(1, HANDLE.tries + 1)
         for start in np.unique(np.minimum(away, last)):
             begin = int(np.searchsorted(along, start, "right")) - 1
             behind, ahead = min(begin + 2, len(path) - 1), max(begin - 2, 0)
-            found, way = self._followed(
+            centres, direction = self._followed(
                 float(np.linalg.norm(places[begin] - places[0])),
                 places[begin],
                 unit(places[[ahead]] - places[[behind]])[0],
@@ -128,17 +137,17 @@ class Handles:
                 half_thickness,
                 self._sections.across[path[begin]],
             )
-            inwards = body.middle - found[-1]
-            if len(found) > 1 and inwards @ np.linalg.solve(body.wall, inwards) < AXIS_LEAVES**2:
+            inwards = body.middle - centres[-1]
+            if len(centres) > 1 and inwards @ np.linalg.solve(body.wall, inwards) < CURVE.undisturbed**2:
                 # the wall disturbs what the handle says of its direction: the more it turns aside, the less that counts
-                straight = max(inwards @ way, 0.0)
+                straight = max(inwards @ direction, 0.0)
                 share = straight**2 / max(inwards @ inwards, TINY)
-                way = unit(((1 - share) * inwards + share * straight * way)[None])[0]
-                return Line(found[-1], way, radius, 0.0, float(along[begin]), found[::-1], radius)
+                direction = unit(((1 - share) * inwards + share * straight * direction)[None])[0]
+                return Line(centres[-1], direction, radius, 0.0, float(along[begin]), centres[::-1], radius)
         return None
 
     def _followed(
-        self, far: float, place: Floats, way: Floats, half_width: float, half_thickness: float, across: Floats
+        self, far: float, place: Floats, direction: Floats, half_width: float, half_thickness: float, across: Floats
     ) -> tuple[Floats, Floats]:
         """Follow a handle from a place, at most so far, while its sections close around it.
 
@@ -148,23 +157,23 @@ class Handles:
         tangent plane touches an ellipse with the half axes of the handle, so that the wall of the body hardly does.
         """
         radius = max(np.sqrt(half_width * half_thickness), TINY)
-        found = [place]
-        for _ in range(int(far / (HANDLE_STEP * radius))):
-            centre, turned = found[-1] + HANDLE_STEP * radius * way, way
-            near = self._tree.query_ball_point(centre, np.hypot(radius, AXIS_LEAVES * half_width))
+        centres = [place]
+        for _ in range(int(far / (HANDLE.step * radius))):
+            centre, turned = centres[-1] + HANDLE.step * radius * direction, direction
+            near = self._tree.query_ball_point(centre, np.hypot(radius, CURVE.undisturbed * half_width))
             points, normals = self.cloud.points[near], self.cloud.normals[near]
-            for fits in range(HANDLE_ROUNDS + 1):
+            for fits in range(HANDLE.rounds + 1):
                 offset = points - centre
                 along, lean, side = offset @ turned, (normals @ turned) ** 2, (normals @ across) ** 2
                 aside = offset - along[:, None] * turned
                 height = dot(normals, aside)
                 due = np.sqrt(half_width**2 * side + half_thickness**2 * np.maximum(1 - lean - side, 0))
                 weight = np.maximum(1 - (along / radius) ** 2, 0) * np.maximum(1 - 2 * lean, 0)
-                weight /= 1 + ((np.abs(height) - due) / (SURFACE_FIT * radius)) ** 2
-                weight *= norm(aside) < AXIS_LEAVES * half_width
-                if fits == HANDLE_ROUNDS or np.count_nonzero(weight) < HANDLE_POINTS:
+                weight /= 1 + ((np.abs(height) - due) / (CURVE.touching * radius)) ** 2
+                weight *= norm(aside) < CURVE.undisturbed * half_width
+                if fits == HANDLE.rounds or np.count_nonzero(weight) < HANDLE.points:
                     break
-                stay = FIT_STAY * weight.sum() * np.eye(3)
+                stay = CURVE.stay * weight.sum() * np.eye(3)
                 squares = (weight[:, None] * normals).T @ normals + stay @ (np.eye(3) - np.outer(turned, turned))
                 turn = np.linalg.eigh(squares)[1][:, 0]
                 turn = turn if turn @ turned > 0 else -turn
@@ -174,10 +183,10 @@ class Handles:
                 centre = centre + step - (step @ turn) * turn
                 turned = unit((turned + turn)[None])[0]
             outward = np.linalg.norm(np.copysign(weight, height) @ normals)
-            if np.count_nonzero(weight) < HANDLE_POINTS or outward > HANDLE_OPEN * weight.sum():
+            if np.count_nonzero(weight) < HANDLE.points or outward > HANDLE.open * weight.sum():
                 break
-            found.append(centre)
-            way = turned
+            centres.append(centre)
+            direction = turned
             across = half_axes((weight @ normal_moments(normals, offset))[None], np.array([radius])).across[0]
         # half a ring hardly says where it leads: the last places do
-        return np.array(found), unit((found[-1] - found[max(len(found) - 3, 0)])[None])[0]
+        return np.array(centres), unit((centres[-1] - centres[max(len(centres) - 3, 0)])[None])[0]

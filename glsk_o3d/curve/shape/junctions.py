@@ -1,27 +1,38 @@
 """Move junctions to where limbs meet: their lines and the surface around say it, and not the contraction."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
+from ...geometry.numbers import derived, fitted, precision
 from ...geometry.polylines import arc_lengths, place_at, relative_distance
 from ...geometry.vectors import TINY, dot
-from ..axis.fit import FIT_STAY, axis_box
-from ..axis.sections import SURFACE_FIT
+from ..axis.fit import axis_box
 from ..curve import Curve
-from ..limbs import AXIS_LEAVES, AXIS_LENGTH, JunctionLimbs, Line
+from ..limbs import JunctionLimbs, Line
 from ..merging import merge_into
+from ..numbers import CURVE
 from .handles import Handles
 
-# All fitted, but for the steps.
-LINE_NOISE = 0.05  # radii that a line is off at its middle, on a straight limb
-LINE_STEP = 0.1  # derived: radii from one place on a limb to the next that is asked
-LINE_STEPS = 400  # derived: places at most
-SURFACE_WEIGHT = 12.0  # of the surface that fits a sphere, over that of a line that says exactly where it is
-MEETING_ROUNDS = 10  # precision: from then on hardly anything moves
+
+@dataclass(frozen=True)
+class JunctionNumbers:
+    """Numbers of `move_junctions`."""
+
+    line_noise: float = fitted(0.05, "radii that a line is off at its middle, on a straight limb")
+    line_step: float = derived(0.1, "radii from one place on a limb to the next that is asked")
+    most_steps: int = derived(400, "places on a limb at most")
+    least_steps: int = precision(8, "places on a limb at least")
+    surface: float = fitted(12.0, "weight of the surface that fits a sphere, over that of a certain line")
+    rounds: int = precision(10, "rounds; from then on hardly anything moves")
+    radius_hold: float = precision(1e-6, "weight of the sphere's radius before, where no surface says it")
+
+
+JUNCTION = JunctionNumbers()
 
 
 class _Place(NamedTuple):
@@ -69,20 +80,20 @@ def _places(
     """Where every junction belongs, if that is not known of the same limbs from before others were merged."""
     cloud = handles.cloud if handles else curve.cloud
     low, high = axis_box(cloud.points if len(cloud.points) else curve.vertices)
-    found = {}
+    places = {}
     for junction in sorted(limbs.at):
-        name, here = limbs.signature(junction), limbs.at[junction]
-        paths = [limbs.paths[limb] for limb in here]
+        name, limbs_here = limbs.signature(junction), limbs.at[junction]
+        paths = [limbs.paths[limb] for limb in limbs_here]
         body = handles.body(paths) if handles and any(map(handles.on_loop, paths)) else None
         follows = [handles.follow(path, body) if handles and body else None for path in paths]
         followed = sum(line is not None for line in follows)
         if name in known and not followed:
-            found[junction] = known[name]
+            places[junction] = known[name]
             continue
         lines, radius, around = [], 0.0, []
-        for limb, path, line in zip(here, paths, follows, strict=True):
+        for limb, path, line in zip(limbs_here, paths, follows, strict=True):
             along = arc_lengths(limbs.vertices[path])
-            others = [limbs.paths[k] for k in here if limbs.branch[k] != limbs.branch[limb]]
+            others = [limbs.paths[k] for k in limbs_here if limbs.branch[k] != limbs.branch[limb]]
             radius_of = limbs.radius[limbs.branch[limb]]
             line = line or limb_line(limbs.vertices, limbs.surface, path, radius_of, others)
             lines.append(line)
@@ -101,8 +112,8 @@ def _places(
                 wall = line.lead[:1]
                 way_in = wall + max((place - wall[0]) @ line.way, 0) * line.way
                 lines[k] = line._replace(lead=np.concatenate([way_in, line.lead]))
-        known[name] = found[junction] = _Place(place, touching, lines)
-    return found
+        known[name] = places[junction] = _Place(place, touching, lines)
+    return places
 
 
 def _merged(curve: Curve, limbs: JunctionLimbs, places: dict[int, _Place]) -> Curve | None:
@@ -111,10 +122,10 @@ def _merged(curve: Curve, limbs: JunctionLimbs, places: dict[int, _Place]) -> Cu
     near: dict[int, tuple[float, int]] = {}
     for k in np.flatnonzero(limbs.inner).tolist():
         (a, b) = (places[v] for v in ends[k])
-        apart = float(np.linalg.norm(a.place - b.place)) / max(a.radius, b.radius, TINY)
-        if apart < 1 and ends.count(ends[k]) == 1:
+        distance = float(np.linalg.norm(a.place - b.place)) / max(a.radius, b.radius, TINY)
+        if distance < 1 and ends.count(ends[k]) == 1:
             for v in ends[k]:
-                near[v] = min(near.get(v, (np.inf, k)), (apart, k))
+                near[v] = min(near.get(v, (np.inf, k)), (distance, k))
     pairs = [k for k in {k for _, k in near.values()} if all(near[v][1] == k for v in ends[k])]
     if not pairs:
         return None
@@ -179,7 +190,7 @@ def _through_air(curve: Curve, places: dict[int, _Place]) -> np.ndarray:
     ends = np.array([(it.place, line.lead[:2][-1]) for it in places.values() for line in it.lines]).reshape(-1, 2, 3)
     thickest = [max(line.radius for line in it.lines) for it in places.values() for _ in it.lines]
     away = cKDTree(curve.points[curve.vertex_of_point >= 0]).query(ends.mean(axis=1))[0]
-    return ends[np.isfinite(away) & (away > AXIS_LENGTH * np.array(thickest))]
+    return ends[np.isfinite(away) & (away > CURVE.line_length * np.array(thickest))]
 
 
 def limb_line(
@@ -188,34 +199,34 @@ def limb_line(
     """The straight line through the part of a limb that is undisturbed by others, and nearest to its junction.
 
     Nothing is decided: every place counts by how far it has left the others, from 0 at their surface on, and less and
-    less from `AXIS_LENGTH` radii on. The half towards the limb's other end counts as undisturbed, whatever is there.
+    less from two radii on. The half towards the limb's other end counts as undisturbed, whatever is there.
     All paths are numbers of `vertices` (M, 3), the limb's from its junction on; the surface is `surface` (M,) away from
     these.
     """
     places = vertices[path]
     along = arc_lengths(places)
-    step = max(LINE_STEP * radius, along[-1] / LINE_STEPS, TINY)
-    n = max(int(np.ceil(along[-1] / step)), 8)
+    step = max(JUNCTION.line_step * radius, along[-1] / JUNCTION.most_steps, TINY)
+    n = max(int(np.ceil(along[-1] / step)), JUNCTION.least_steps)
     step, half = along[-1] / n, n // 2
     at = (np.arange(n) + 0.5) * step
     middles, clear = place_at(places, along, at), np.ones(n)
     if others:
-        left, _ = relative_distance(middles, vertices, surface, others)
-        clear = np.clip((left - 1) / (2 * (AXIS_LEAVES - 1)), 0, 1)
+        ratio, _ = relative_distance(middles, vertices, surface, others)
+        clear = np.clip((ratio - 1) / (2 * (CURVE.undisturbed - 1)), 0, 1)
         clear[:half] = np.minimum.accumulate(clear[:half][::-1])[::-1]  # what left and came back had not left
     start = float((1 - clear[:half]).sum() * step)
     anchor = place_at(places, along, start)
-    weight = clear * np.clip(1.5 - np.cumsum(clear) * step / max(AXIS_LENGTH * radius, TINY), 0, 1)
+    weight = clear * np.clip(1.5 - np.cumsum(clear) * step / max(CURVE.line_length * radius, TINY), 0, 1)
     total = weight.sum()
     if total * step <= 0:
         return Line(anchor, np.zeros(3), 0.0, 0.0, start, anchor[None], radius)
     weight /= total
     middle, mean = weight @ middles, weight @ at
-    way = (weight * (mean - at)) @ (middles - middle)
-    way /= max(np.linalg.norm(way), TINY)
-    off = middles - middle - (mean - at)[:, None] * way
+    direction = (weight * (mean - at)) @ (middles - middle)
+    direction /= max(np.linalg.norm(direction), TINY)
+    off = middles - middle - (mean - at)[:, None] * direction
     spread, bend = np.sqrt(weight @ (at - mean) ** 2), np.sqrt(weight @ dot(off, off))
-    return Line(middle, way, float(spread), float(bend), start, anchor[None], radius)
+    return Line(middle, direction, float(spread), float(bend), start, anchor[None], radius)
 
 
 def meet(
@@ -236,16 +247,18 @@ def meet(
     """
     place, touching, radius = near, radius, max(radius, TINY ** (1 / 3))  # its square is a divisor
     known = [line for line in lines if line.spread > 0 and line.radius > 0]
-    middle, way = np.array([(line.middle, line.way) for line in known]).reshape(-1, 2, 3).transpose(1, 0, 2)
-    spread, noise = np.array([(line.spread, line.bend / line.radius + LINE_NOISE) for line in known]).reshape(-1, 2).T
-    across = np.eye(3) - way[:, :, None] * way[:, None]
-    for _ in range(MEETING_ROUNDS):
-        matrix, right = np.diag([FIT_STAY] * 3 + [1e-6]), np.zeros(4)
-        right[:3] = FIT_STAY * (near - place)
-        right[3] = 1e-6 * touching
+    middle, direction = np.array([(line.middle, line.way) for line in known]).reshape(-1, 2, 3).transpose(1, 0, 2)
+    spread, noise = (
+        np.array([(line.spread, line.bend / line.radius + JUNCTION.line_noise) for line in known]).reshape(-1, 2).T
+    )
+    across = np.eye(3) - direction[:, :, None] * direction[:, None]
+    for _ in range(JUNCTION.rounds):
+        matrix, right = np.diag([CURVE.stay] * 3 + [JUNCTION.radius_hold]), np.zeros(4)
+        right[:3] = CURVE.stay * (near - place)
+        right[3] = JUNCTION.radius_hold * touching
         offset = middle - place
-        ahead = dot(offset, way)
-        aside, error = offset - ahead[:, None] * way, noise * (1 + (ahead / spread) ** 2)
+        ahead = dot(offset, direction)
+        aside, error = offset - ahead[:, None] * direction, noise * (1 + (ahead / spread) ** 2)
         weight = 1 / ((1 + error**2) * (1 + dot(aside, aside) / radius**2))
         matrix[:3, :3] += (weight[:, None, None] * across).sum(axis=0)
         right[:3] += weight @ aside
@@ -253,8 +266,8 @@ def meet(
             offset = points - place
             window, height = np.exp(-dot(offset, offset) / (2 * radius**2)), dot(offset, normals)
             high = np.abs(height)
-            fits = window / (1 + ((high - touching) / (SURFACE_FIT * radius)) ** 2)
-            fits *= SURFACE_WEIGHT / max(window.sum(), SURFACE_WEIGHT * TINY)  # nothing near, no say
+            fits = window / (1 + ((high - touching) / (CURVE.touching * radius)) ** 2)
+            fits *= JUNCTION.surface / max(window.sum(), JUNCTION.surface * TINY)  # nothing near, no say
             # of n with the sign of its height, and 1
             matrix[:3, :3] += (fits[:, None] * normals).T @ normals
             matrix[3, :3] = matrix[:3, 3] = np.copysign(fits, height) @ normals

@@ -8,12 +8,8 @@ from ...geometry.near_links import linked
 from ...geometry.neighbourhoods import nearest_neighbours
 from ...geometry.vectors import TINY, norm
 from ..curve import Curve
-from ..diagnostics import MAJORITY, STUB_LENGTH
+from ..numbers import CURVE
 from ..surface import Surface
-
-# fitted: half width of a wide end over that of its neck, and of a body over that of its handle, at least; with 2 (ends)
-# and 4 (handles) the scores are the same
-WIDE_NECK = 3.0
 
 
 def level_wide_ends(curve: Curve, surface: Surface) -> Curve:
@@ -52,10 +48,10 @@ def _wide_end(path: np.ndarray, vertices: np.ndarray, width: np.ndarray, other: 
     vertices or more.
     """
     wide, places = width[path], vertices[path]
-    top = int(np.argmax(np.where(norm(places - places[-1]) < STUB_LENGTH * wide, wide, 0)))
-    thin = (WIDE_NECK * wide[:top] <= wide[top]) & (norm(places[:top] - places[top]) >= wide[top])
-    thin &= (not other) | (WIDE_NECK * norm(places[:top] - places[0]) >= wide[top])
-    thin &= norm(places[:top] - places[-1]) < STUB_LENGTH * wide[top]
+    top = int(np.argmax(np.where(norm(places - places[-1]) < CURVE.stub * wide, wide, 0)))
+    thin = (CURVE.neck * wide[:top] <= wide[top]) & (norm(places[:top] - places[top]) >= wide[top])
+    thin &= (not other) | (CURVE.neck * norm(places[:top] - places[0]) >= wide[top])
+    thin &= norm(places[:top] - places[-1]) < CURVE.stub * wide[top]
     if not thin.any():
         return path[:0]
     neck = np.argmin(np.where(thin, wide[:top], np.inf))
@@ -74,7 +70,7 @@ def _levelled(curve: Curve, run: np.ndarray, surface: Surface) -> Curve:
     pairs = np.column_stack([np.repeat(np.arange(len(rows)), k), index[surface.neighbours[rows]].ravel()])
     away = dijkstra(linked(surface.points[rows], pairs[pairs[:, 1] >= 0]), indices=neck, min_only=True)
     reached, n = np.isfinite(away), len(run) - 2
-    if reached.mean() < MAJORITY:  # a bridge joins them, and no surface
+    if reached.mean() < CURVE.majority:  # a bridge joins them, and no surface
         return curve
     away, points = away[reached], surface.points[rows[reached]]
     band = np.minimum((n * away / max(away.max(), TINY)).astype(int), n - 1)

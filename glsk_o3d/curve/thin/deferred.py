@@ -11,9 +11,9 @@ from ...data.graph import all_of_vertices
 from ...geometry.near_links import spanning
 from ...geometry.vectors import norm
 from ..curve import Curve
-from ..diagnostics import MAJORITY
+from ..numbers import CURVE
 from ..topology.false_branches import CROSSING_HOPS
-from .detect import REGION_VERTICES, UNSURE_CONFIDENCE, SpacedPoints, mostly_on_loops, without_surface
+from .detect import THIN, SpacedPoints, mostly_on_loops, without_surface
 
 
 class Deferred(NamedTuple):
@@ -30,8 +30,8 @@ class Deferred(NamedTuple):
         No surface around them says anything, and there are thousands of them to be asked about. `least` is as in
         `without_surface`.
         """
-        cloud, unsure = SpacedPoints(curve), curve.confidence < UNSURE_CONFIDENCE
-        if len(unsure) <= REGION_VERTICES or not _most(cloud, unsure) or mostly_on_loops(curve, unsure):
+        cloud, unsure = SpacedPoints(curve), curve.confidence < CURVE.unsure
+        if len(unsure) <= THIN.region_vertices or not _most(cloud, unsure) or mostly_on_loops(curve, unsure):
             return None
         gone = without_surface(cloud, least)
         if not _most(cloud, gone) or mostly_on_loops(curve, gone):
@@ -43,11 +43,11 @@ class Deferred(NamedTuple):
 
     def rest(self) -> Curve:
         """What is left, with its points alone."""
-        whole, left, rows = self.whole, ~self.gone, self.rows
-        number = np.cumsum(left) - 1
+        whole, stays, rows = self.whole, ~self.gone, self.rows
+        number = np.cumsum(stays) - 1
         return whole.changed(
-            **all_of_vertices(whole, left),
-            edges=number[whole.edges[left[whole.edges].all(axis=1)]],
+            **all_of_vertices(whole, stays),
+            edges=number[whole.edges[stays[whole.edges].all(axis=1)]],
             vertex_of_point=number[whole.vertex_of_point[rows]],
             points=whole.points[rows],
             normals=whole.normals[rows],
@@ -77,4 +77,4 @@ class Deferred(NamedTuple):
 
 
 def _most(cloud: SpacedPoints, some: np.ndarray) -> bool:
-    return bool(cloud.count[some].sum() > MAJORITY * cloud.count.sum())
+    return bool(cloud.count[some].sum() > CURVE.majority * cloud.count.sum())

@@ -1,35 +1,43 @@
 """Tell where a cloud shows no surface: where its parts are thinner than its points are far apart."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_matrix
 
 from ...data.graph import Graph
-from ...data.points import RIDGE_NEIGHBOURS, noise_share
+from ...data.points import POINTS, noise_share
 from ...geometry.cycles import edges_on_cycles
 from ...geometry.eigen import largest_eigenvalue
 from ...geometry.grid_sampling import SAMPLED_POINTS, sample_cloud
 from ...geometry.groups import component_labels, first_in_their_place, group_sum
 from ...geometry.near_links import link_growth, near_links
 from ...geometry.neighbourhoods import nearest_neighbours, principal
+from ...geometry.numbers import derived, fitted, measured
 from ...geometry.vectors import COLUMNS, ROWS, TINY
 from ...geometry.winding import AREA_NEIGHBOURS
 from ..axis.sections import VertexPoints
 from ..curve import Curve
-from ..diagnostics import MAJORITY, SHEET_SHARE, STUB_LENGTH
 from ..merging import drop_vertices
+from ..numbers import CURVE
 
-LEAST_SURFACE = 0.65  # fitted: share of the points of a region with a surface that show one
-SAME_PLACE = 1e-6  # derived: share of the cloud's extent below which points are not apart
-LEAST_POINTS = 64  # fitted: of which fewer say nothing about where there is no surface
-SURFACE_GROWTH = 2.5  # measured: growth of links on a surface; noise that fills space has more, a curve 1.7
-SHEET_GROWTH = 2.2  # fitted: growth of links that a sheet surely has
-UNSURE_CONFIDENCE = 0.4  # fitted: confidence below which the normals around a vertex do not say where the axis is
-REGION_POINTS = 1200  # fitted: points around a vertex of which a share must show a surface
-REGION_VERTICES = 400  # measured: vertices in which these are looked for
-SURE_CONFIDENCE = 1 - UNSURE_CONFIDENCE  # derived: least in a stretch that surely has a surface
+
+@dataclass(frozen=True)
+class ThinNumbers:
+    """Numbers that tell where a cloud shows no surface."""
+
+    least_surface: float = fitted(0.65, "share of the points of a region with a surface that show one")
+    same_place: float = derived(1e-6, "share of the cloud's extent below which points are not apart")
+    points: int = fitted(64, "points; fewer say nothing about where there is no surface")
+    sheet_growth: float = fitted(2.2, "growth of links that a sheet surely has")
+    region_points: int = fitted(1200, "points around a vertex of which a share must show a surface")
+    region_vertices: int = measured(400, "vertices in which these are looked for")
+
+
+THIN = ThinNumbers()
+
+SURE_CONFIDENCE = 1 - CURVE.unsure  # derived: least in a stretch that surely has a surface
 
 
 class SpacedPoints(VertexPoints):
@@ -45,7 +53,7 @@ class SpacedPoints(VertexPoints):
         if len(some):
             some = some[sample_cloud(points[some], SAMPLED_POINTS)[0]]
         wide = np.ptp(points[some], axis=0).max() if len(some) else 0.0
-        return some[first_in_their_place(np.rint(points[some] / max(SAME_PLACE * wide, TINY)))]
+        return some[first_in_their_place(np.rint(points[some] / max(THIN.same_place * wide, TINY)))]
 
     @cached_property
     def links(self) -> csr_matrix:
@@ -60,7 +68,7 @@ class SpacedPoints(VertexPoints):
     @property
     def scattered(self) -> np.ndarray:
         """Whether each of them is one of many that fill space, (n,) bool array, as noise as wide as its part does."""
-        near = nearest_neighbours(self.points, min(RIDGE_NEIGHBOURS, len(self.points)))[1]
+        near = nearest_neighbours(self.points, min(POINTS.ridge_neighbours, len(self.points)))[1]
         inner = self.points / max(np.ptp(self.points, axis=0).max(), TINY)  # whose fourth powers do not overflow
         return noise_share(principal(inner, near)[0], near) > 0
 
@@ -75,16 +83,16 @@ def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
     points fill space, they are no twigs, but a part scattered as thick as it is wide, and there are no such vertices.
     """
     curve, m = cloud.graph, len(cloud.graph.vertices)
-    thin = curve.confidence < UNSURE_CONFIDENCE
-    if not may_lack_surface(curve, least) or len(cloud.rows) < LEAST_POINTS:
+    thin = curve.confidence < CURVE.unsure
+    if not may_lack_surface(curve, least) or len(cloud.rows) < THIN.points:
         return np.zeros(m, bool)
     vertex, count = cloud.vertex, cloud.count
-    _, near = nearest_neighbours(curve.vertices, min(REGION_VERTICES, m))
+    _, near = nearest_neighbours(curve.vertices, min(THIN.region_vertices, m))
     if (_share_around(near, count, thin) <= 1 - least).all():
         return np.zeros(m, bool)
     facts = np.column_stack([link_growth(cloud.links), one_direction(cloud.normals, cloud.links)])
     growth, flat = (group_sum(facts, vertex, m) / np.maximum(count, 1)[:, None]).T
-    thin &= growth < np.where(flat < SHEET_SHARE, SURFACE_GROWTH, SHEET_GROWTH)
+    thin &= growth < np.where(flat < CURVE.sheet, CURVE.surface_growth, THIN.sheet_growth)
     thin = (_share_around(near, count, thin) > 1 - least) & ~_surely_with_surface(curve)
     return thin & (not thin.any() or bool(cloud.scattered[thin[vertex]].mean() <= least))
 
@@ -92,7 +100,7 @@ def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
 def without_detached_clumps(curve: Curve) -> Curve:
     """The same without vertices that nothing is joined to and that have few points: clumps of flying ones, outliers.
 
-    They are fewer than `LEAST_POINTS`, and than half of those of the largest component. Some edge must be left.
+    They are fewer than `THIN.points`, and than half of those of the largest component. Some edge must be left.
     """
     lone, owner, report = curve.degree == 0, curve.vertex_of_point, curve.report
     if not lone.any():
@@ -100,7 +108,7 @@ def without_detached_clumps(curve: Curve) -> Curve:
     rows = curve.supporting_points
     rows = rows[first_in_their_place(curve.points[rows])]
     count = np.bincount(owner[rows], minlength=len(lone))
-    strays = lone & (count < min(LEAST_POINTS, MAJORITY * np.bincount(curve.component_of_vertex, count).max()))
+    strays = lone & (count < min(THIN.points, CURVE.majority * np.bincount(curve.component_of_vertex, count).max()))
     if not strays.any() or not len(curve.edges):
         return curve
     gone = np.append(strays, False)[owner] & ~np.isnan(curve.normals[:, 0])
@@ -117,7 +125,7 @@ def may_lack_surface(curve: Graph, least: float) -> bool:
         return False
     owner, m = curve.vertex_of_point[curve.vertex_of_point >= 0], len(curve.vertices)
     count = np.bincount(owner, minlength=m) / max(len(owner) / SAMPLED_POINTS, 1)
-    return bool(count[curve.confidence < UNSURE_CONFIDENCE].sum() > (1 - least) * min(REGION_POINTS, count.sum()))
+    return bool(count[curve.confidence < CURVE.unsure].sum() > (1 - least) * min(THIN.region_points, count.sum()))
 
 
 def mostly_on_loops(curve: Graph, thin: np.ndarray) -> bool:
@@ -142,7 +150,7 @@ def one_direction(normals: np.ndarray, links: csr_matrix) -> np.ndarray:
 def _share_around(near: np.ndarray, count: np.ndarray, some: np.ndarray) -> np.ndarray:
     """Share that some vertices have in the points of the region around every vertex, by its nearest ones."""
     points = count[near]
-    points[np.cumsum(points, axis=1) - points >= REGION_POINTS] = 0
+    points[np.cumsum(points, axis=1) - points >= THIN.region_points] = 0
     return (points * some[near]).sum(axis=1) / np.maximum(points.sum(axis=1), 1)
 
 
@@ -153,4 +161,4 @@ def _surely_with_surface(curve: Graph) -> np.ndarray:
     stretch = component_labels(m, ends[inside])
     length = np.bincount(stretch[ends[inside, 0]], curve.edge_lengths[inside], m)
     radius = np.bincount(stretch, curve.radii, m) / np.maximum(np.bincount(stretch, minlength=m), 1)
-    return sure & (length > STUB_LENGTH * radius)[stretch]
+    return sure & (length > CURVE.stub * radius)[stretch]

@@ -13,20 +13,28 @@ from scipy.spatial import cKDTree
 
 from ...geometry.groups import component_labels, group_median
 from ...geometry.near_links import LINK_SPACINGS, join_pieces, linked, slice_centres, steps
+from ...geometry.numbers import fitted
 from ...geometry.polylines import incident_edges, nearest_on_edges, places_on_edges
 from ...geometry.vectors import dot, norm, unit
 from ..curve import Curve
 from ..merging import merge_into
 from ..rooted import numbered_from, root_among
-from .detect import SAME_PLACE, SpacedPoints, mostly_on_loops, without_detached_clumps, without_surface
+from .detect import THIN, SpacedPoints, mostly_on_loops, without_detached_clumps, without_surface
 
-# All fitted, on trees whose twigs are thinner than their points are far apart; s is the median scale of the points.
-SLICE_WIDTH = 0.5  # of geodesic distance, over s
-COVER_SCALES = 1.2  # radius around a path in which points need no path of their own, over s
-COVER_RADII = 1.3  # the same over the radius of a part with a surface
-JOIN_SCALES = 8.0  # longest gap that is none, over s
-LEAST_PIECE = 3  # smaller groups of points say nothing of a radius, and farther than that from all others are left out
-MEETING_COSINE = 0.8  # how straight ahead of each other two tips meet that are as near as linked points
+
+@dataclass(frozen=True)
+class TraceNumbers:
+    """Numbers of `trace`, fitted on trees whose twigs are thinner than their points are far apart."""
+
+    slice: float = fitted(0.5, "width of slices of geodesic distance, over the median scale of the points")
+    cover_scales: float = fitted(1.2, "radius around a path in which points need none of their own, over the same")
+    cover_radii: float = fitted(1.3, "the same over the radius of a part with a surface")
+    join: float = fitted(8.0, "longest gap that is none, over the scale of the points")
+    piece: int = fitted(3, "points of a group; fewer say nothing of a radius, and far from others are left out")
+    meeting: float = fitted(0.8, "cosine of two tips that meet, as near as linked points")
+
+
+TRACE = TraceNumbers()
 
 
 def trace(curve: Curve, surface: float, root: str | None) -> Curve:
@@ -54,7 +62,7 @@ def trace(curve: Curve, surface: float, root: str | None) -> Curve:
     traced = _assembled(curve, mixed, paths, tree=root is not None)
     if thin.any():
         kept = None if root is None else paths.index[roots[0]]
-        traced, stays = drop_spurious(traced, paths.nodes < mixed.n, COVER_RADII, kept)
+        traced, stays = drop_spurious(traced, paths.nodes < mixed.n, TRACE.cover_radii, kept)
     else:
         stays = np.arange(len(paths.nodes))
     point = paths.nodes[stays] < mixed.n
@@ -89,8 +97,8 @@ class _Mixed:
         if thin.any():
             scale = float(np.median(cloud.away[:, -1]))
             piece = connected_components(cloud.links, directed=False)[1]
-            floats = cloud.away[:, min(LEAST_PIECE - 1, cloud.away.shape[1] - 1)] > JOIN_SCALES * scale
-            floats &= (np.bincount(piece) < LEAST_PIECE)[piece]
+            floats = cloud.away[:, min(TRACE.piece - 1, cloud.away.shape[1] - 1)] > TRACE.join * scale
+            floats &= (np.bincount(piece) < TRACE.piece)[piece]
             some = np.flatnonzero(thin[cloud.vertex] & ~floats)
         thick, n = np.flatnonzero(~thin), len(some)
         index = np.full(len(thin), -1)
@@ -108,7 +116,7 @@ class _Mixed:
 
     def joined(self, anywhere: bool) -> tuple[_Mixed, np.ndarray]:
         """Its pieces joined, anywhere or only where at least one is without a surface and near; and the new links."""
-        reach = np.full(len(self.places), np.inf if anywhere else JOIN_SCALES * self.scale)
+        reach = np.full(len(self.places), np.inf if anywhere else TRACE.join * self.scale)
         reach[self.n :] = np.inf if anywhere else 0
         links, added = join_pieces(self.places, self.links, reach)
         return replace(self, links=links), added
@@ -129,8 +137,8 @@ class _Paths:
         self.mixed, self.roots, self.steps = mixed, roots, list[tuple[int, int]]()
         self._distance, self._before, _ = dijkstra(mixed.links, indices=roots, return_predecessors=True, min_only=True)
         self.centre = mixed.places.copy()
-        self.centre[:n] = slice_centres(mixed.places[:n], mixed.links[:n, :n], self._distance[:n], SLICE_WIDTH * scale)
-        self._reach = np.maximum(COVER_SCALES * scale, COVER_RADII * mixed.radius)
+        self.centre[:n] = slice_centres(mixed.places[:n], mixed.links[:n, :n], self._distance[:n], TRACE.slice * scale)
+        self._reach = np.maximum(TRACE.cover_scales * scale, TRACE.cover_radii * mixed.radius)
         self._tree = cKDTree(mixed.places)
         self._inside, self._covered = np.zeros(size, bool), np.arange(size) >= n
         self._inside[roots] = True
@@ -163,8 +171,8 @@ class _Paths:
         return path
 
     def _cover(self, path: np.ndarray | list[int]) -> None:
-        for found in self._tree.query_ball_point(self.centre[path], self._reach[path]):
-            self._covered[found] = True
+        for points in self._tree.query_ball_point(self.centre[path], self._reach[path]):
+            self._covered[points] = True
 
 
 def _assembled(curve: Curve, mixed: _Mixed, paths: _Paths, tree: bool) -> Curve:
@@ -202,11 +210,11 @@ def _meetings(vertices: np.ndarray, edges: np.ndarray, tips: np.ndarray, scale: 
     a, b = cKDTree(vertices[tips]).query_pairs(LINK_SPACINGS * scale, output_type="ndarray").T
     gap = vertices[tips[b]] - vertices[tips[a]]
     straight = np.minimum(dot(ahead[a], unit(gap)), -dot(ahead[b], unit(gap)))
-    found: list[int] = []
+    matched: list[int] = []
     for k in np.argsort(norm(gap)).tolist():
-        if straight[k] > MEETING_COSINE and not {a[k], b[k]} & set(found):
-            found += [a[k], b[k]]
-    return tips[found].reshape(-1, 2)
+        if straight[k] > TRACE.meeting and not {a[k], b[k]} & set(matched):
+            matched += [a[k], b[k]]
+    return tips[matched].reshape(-1, 2)
 
 
 def spread_around(curve: Curve) -> np.ndarray:
@@ -223,9 +231,9 @@ def thickness_around(curve: Curve) -> np.ndarray:
     Their median is the radius of a part whose vertices are some of its points.
     """
     away, vertex = _distances(curve)
-    off = away > SAME_PLACE * np.ptp(curve.vertices, axis=0).max()
+    off = away > THIN.same_place * np.ptp(curve.vertices, axis=0).max()
     thickness = group_median(away[off], vertex[off], len(curve.vertices))
-    known = np.flatnonzero(np.bincount(vertex[off], minlength=len(thickness)) >= LEAST_PIECE)
+    known = np.flatnonzero(np.bincount(vertex[off], minlength=len(thickness)) >= TRACE.piece)
     if not len(known):  # a line
         return thickness
     links = linked(curve.vertices, curve.edges)
@@ -275,9 +283,9 @@ def drop_spurious(curve: Curve, traced: np.ndarray, radii: float, root: int | No
             return curve, stays
         group, gone = np.arange(len(traced)), np.isin(twig, chosen)
         group[body[gone]] = forks[twig[gone]]
-        left = np.unique(group)
-        root = None if root is None else int(np.searchsorted(left, root))
-        curve, traced, stays = merge_into(curve, group), traced[left], stays[left]
+        remaining = np.unique(group)
+        root = None if root is None else int(np.searchsorted(remaining, root))
+        curve, traced, stays = merge_into(curve, group), traced[remaining], stays[remaining]
         curve = curve.changed(radii=np.where(traced, spread_around(curve), curve.radii))
 
 
@@ -285,5 +293,5 @@ def _twigs(curve: Curve, traced: np.ndarray, root: int | None) -> list[np.ndarra
     """Traced branches that end, as paths from the junctions that they leave, by their tips."""
     degree, free = curve.degree, traced & (np.arange(len(traced)) != (-1 if root is None else root))
     paths = [branch[::-1] if degree[branch[0]] == 1 else branch for branch in curve.branches]
-    found = [path for path in paths if degree[path[0]] > 2 and degree[path[-1]] == 1 and free[path[1:]].all()]
-    return sorted(found, key=lambda path: int(path[-1]))
+    twigs = [path for path in paths if degree[path[0]] > 2 and degree[path[-1]] == 1 and free[path[1:]].all()]
+    return sorted(twigs, key=lambda path: int(path[-1]))

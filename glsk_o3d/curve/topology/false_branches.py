@@ -1,6 +1,7 @@
 """False branches: which cross empty space?"""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from heapq import heappop, heappush
 from typing import ClassVar
 
@@ -8,19 +9,31 @@ import numpy as np
 
 from ...data.decisions import logistic
 from ...geometry.groups import quantile
+from ...geometry.numbers import derived, fitted
 from ...geometry.polylines import place_at
 from ...geometry.vectors import TINY
 from ..curve import Curve
 from ..merging import drop_edges, drop_vertices
+from ..numbers import CURVE
 from ..surface import Evidence
 from .loops import crossings, positions
 from .question import Candidate, Question
 
-AIR_WINDOW = 1.0  # derived: radii of a branch along which evidence is averaged; a false edge is two radii long or more
-# fitted: radii over which it is seen where a curve goes: beyond an edge, but the first third, or to an end
-HEADING_RADII = 3.0
-CROSSING_HOPS = int(2 * HEADING_RADII)  # derived: edges as long, of half a radius, whose vertices count to their side
-LEAST_SCATTER = 0.05  # fitted: of winding numbers along a curve
+
+@dataclass(frozen=True)
+class FalseBranchNumbers:
+    """Numbers of `FalseBranches`."""
+
+    window: float = derived(1.0, "radii of a branch along which evidence is averaged; false edges have two or more")
+    scatter: float = fitted(0.05, "least scatter of winding numbers along a curve, over their median")
+    least_surface: float = fitted(0.05, "share of a tube's area below which the surface says no more")
+    least_bonds: float = fitted(0.05, "share of a tube's points below which bonds say no more")
+    least_length: float = fitted(0.1, "radii below which a length says no more")
+
+
+FALSE_BRANCH = FalseBranchNumbers()
+
+CROSSING_HOPS = int(2 * CURVE.heading)  # derived: edges as long, of half a radius, whose vertices count to their side
 
 
 class FalseBranches(Question):
@@ -70,7 +83,7 @@ def branch_facts(evidence: Evidence) -> Iterator[tuple[np.ndarray, int, dict[str
     vertices, edges, m = curve.vertices, curve.edges, len(curve.vertices)
     length = np.maximum(curve.edge_lengths, TINY)
     typical = quantile(winding)
-    scatter = 1.4826 * quantile(np.abs(winding - typical)) + LEAST_SCATTER * abs(typical)
+    scatter = 1.4826 * quantile(np.abs(winding - typical)) + FALSE_BRANCH.scatter * abs(typical)
     tubes = 2 * np.pi * np.maximum(curve.radii[edges].mean(axis=1), TINY) @ length
     area = evidence.area.sum()
     seen = max(area / max(tubes, area * TINY, TINY), TINY)  # a line has no tubes
@@ -95,17 +108,18 @@ def branch_facts(evidence: Evidence) -> Iterator[tuple[np.ndarray, int, dict[str
         radius = max(quantile(curve.radii[branch]), float(np.finfo(float).eps * length.sum()), TINY)
         ends = np.append(0, np.cumsum(length[edge]))
         amounts = winding[edge] * length[edge], evidence.area[edge]
-        smooth, areas = _window_means(ends, ends[1:] - length[edge] / 2, AIR_WINDOW * radius, *amounts)
+        smooth, areas = _window_means(ends, ends[1:] - length[edge] / 2, FALSE_BRANCH.window * radius, *amounts)
         k = int(np.argmin(smooth))
-        surface = areas[k] / (2 * np.pi * radius)
+        tube = 2 * np.pi * radius
+        surface = areas[k] / tube
         facts = dict(
             deficit=np.log1p(max((typical - smooth[k]) / max(scatter, TINY), 0)),
-            surface=np.log(max(surface / seen, 0) + 0.05),
+            surface=np.log(max(surface / seen, 0) + FALSE_BRANCH.least_surface),
             straightness=_straightness(vertices, around, branch, k, radius),
             noise=curve.report.noise,
-            bonds=np.log(float(bonded.min()) / 2 * evidence.surface.spacing / (2 * np.pi * radius) + 0.05),
+            bonds=np.log(float(bonded.min()) / 2 * evidence.surface.spacing / tube + FALSE_BRANCH.least_bonds),
             inner=float((curve.degree[branch[[0, -1]]] > 1).all()),
-            length=np.log(ends[-1] / radius + 0.1),
+            length=np.log(ends[-1] / radius + FALSE_BRANCH.least_length),
         )
         yield branch, k, facts
 
@@ -125,11 +139,11 @@ def _sides(branch: np.ndarray, around: list[list[tuple[int, float]]], m: int) ->
     """
     inner, sides = set(branch[1:-1].tolist()), []
     for start, stop in ((int(branch[0]), int(branch[-1])), (int(branch[-1]), int(branch[0]))):
-        found, front = {start}, [start]
+        reached, front = {start}, [start]
         for _ in range(CROSSING_HOPS):
-            front = [v for u in front for v, _ in around[u] if v not in found and v not in inner and v != stop]
-            found.update(front)
-        sides.append(found)
+            front = [v for u in front for v, _ in around[u] if v not in reached and v not in inner and v != stop]
+            reached.update(front)
+        sides.append(reached)
     place = positions(branch, m)
     place[list(sides[0] - sides[1])] = 0
     place[list(sides[1] - sides[0])] = len(branch) - 1
@@ -141,31 +155,31 @@ def _straightness(
 ) -> float:
     """Cosine between an edge of a branch and how the curve goes on beyond, at the better of both ends."""
     low, high = branch[max(k - 1, 0)], branch[min(k + 2, len(branch) - 1)]
-    way = vertices[high] - vertices[low]
-    way = way / max(np.linalg.norm(way), TINY)
+    direction = vertices[high] - vertices[low]
+    direction = direction / max(np.linalg.norm(direction), TINY)
     best = []
-    for here, came, sign in ((int(branch[k + 1]), int(branch[k]), 1), (int(branch[k]), int(branch[k + 1]), -1)):
-        ways = _beyond(vertices, around, here, came, HEADING_RADII * radius)
-        best.append(max((sign * float(way @ onward) for onward in ways), default=1.0))
+    for vertex, previous, sign in ((int(branch[k + 1]), int(branch[k]), 1), (int(branch[k]), int(branch[k + 1]), -1)):
+        onwards = _beyond(vertices, around, vertex, previous, CURVE.heading * radius)
+        best.append(max((sign * float(direction @ onward) for onward in onwards), default=1.0))
     return max(best)
 
 
 def _beyond(
-    vertices: np.ndarray, around: list[list[tuple[int, float]]], start: int, came: int, reach: float
+    vertices: np.ndarray, around: list[list[tuple[int, float]]], start: int, previous: int, reach: float
 ) -> list[np.ndarray]:
     """Directions in which a graph goes on from a vertex, along all its shortest ways: over their last two thirds."""
-    before: dict[int, int] = {came: -1}
+    before: dict[int, int] = {previous: -1}
     travelled: dict[int, float] = {}
     heap = [(0.0, start, -1)]
     while heap:
-        far, here, origin = heappop(heap)
-        if here in before:
+        far, vertex, origin = heappop(heap)
+        if vertex in before:
             continue
-        before[here], travelled[here] = origin, far
+        before[vertex], travelled[vertex] = origin, far
         if far < reach:
-            for onward, length in around[here]:
-                heappush(heap, (far + length, onward, here))
-    found = []
+            for onward, length in around[vertex]:
+                heappush(heap, (far + length, onward, vertex))
+    directions = []
     for tip in travelled.keys() - before.values() - {start}:
         path = [tip]
         while path[-1] != start:
@@ -173,5 +187,5 @@ def _beyond(
         along, places = np.array([travelled[v] for v in reversed(path)]), vertices[path[::-1]]
         stop = min(along[-1], reach)
         first, last = place_at(places, along, stop / 3), place_at(places, along, stop)
-        found.append((last - first) / max(float(np.linalg.norm(last - first)), TINY))
-    return found
+        directions.append((last - first) / max(float(np.linalg.norm(last - first)), TINY))
+    return directions

@@ -1,6 +1,7 @@
 """Gaps that a scan or the contraction leaves: across which does the object go on?"""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -9,18 +10,29 @@ from scipy.sparse.csgraph import dijkstra
 from ...data.decisions import logistic
 from ...geometry.groups import quantile
 from ...geometry.near_links import linked
+from ...geometry.numbers import derived, fitted
 from ...geometry.polylines import arc_lengths
 from ...geometry.vectors import TINY, dot, norm
 from ..curve import Curve
-from ..surface import LEAST_INSIDE, Evidence, Surface
-from .false_branches import HEADING_RADII
+from ..numbers import CURVE
+from ..surface import Evidence, Surface
 from .question import Candidate, Question
-from .spurs import NOT_BESIDE
 
-# All fitted but where it says otherwise.
-BRIDGE_REACH = 6.0  # longest gap, in radii of the end
-BRIDGE_COSINE = 0.5  # least cosine between the bridge and the end
-DETOUR = 3.0  # least way along the curve over that across the gap; less would make a loop of nothing
+
+@dataclass(frozen=True)
+class GapNumbers:
+    """Numbers of `Gaps`."""
+
+    reach: float = fitted(6.0, "longest gap, in radii of the end")
+    cosine: float = fitted(0.5, "least cosine between the bridge and the end")
+    detour: float = fitted(3.0, "least way along the curve over that across the gap")
+    least_winding: float = derived(-0.5, "relative winding number below which it says no more")
+    most_winding: float = derived(1.3, "relative winding number above which it says no more")
+    least_cap: float = fitted(0.1, "flux below which the cap of an end says no more")
+
+
+GAP = GapNumbers()
+
 BRIDGE_SAMPLES = np.arange(1, 8)[:, None] / 8  # derived: places along a bridge, evenly
 
 
@@ -70,18 +82,21 @@ def gap_facts(evidence: Evidence) -> Iterator[tuple[tuple[int, int], dict[str, f
     if not ends or not len(surface.points):
         return
     typical = quantile(evidence.winding)
-    if typical < LEAST_INSIDE:
+    if typical < CURVE.inside:
         return  # parts too thin to have an inside, which could go on across a gap
     leaves = [end.leaf for end in ends]
     along = dijkstra(linked(curve.vertices, curve.edges), indices=leaves)
-    found = [(end, other) for i, end in enumerate(ends) for other in _aims(curve, end, along[i], leaves, along)]
-    if not found:
+    bridges = [(end, other) for i, end in enumerate(ends) for other in _aims(curve, end, along[i], leaves, along)]
+    if not bridges:
         return
-    across = [curve.vertices[other] - end.place for end, other in found]
-    samples = [end.place + BRIDGE_SAMPLES * way for (end, *_), way in zip(found, across, strict=True)]
-    winding = surface.winding(np.concatenate(samples)).reshape(len(found), -1).min(axis=1) / typical
-    for (end, other), least in zip(found, winding, strict=True):
-        facts = dict(winding=float(np.clip(least, -0.5, 1.3)), cap=float(np.log(_cap(end, surface) + 0.1)))
+    across = [curve.vertices[other] - end.place for end, other in bridges]
+    samples = [end.place + BRIDGE_SAMPLES * way for (end, *_), way in zip(bridges, across, strict=True)]
+    winding = surface.winding(np.concatenate(samples)).reshape(len(bridges), -1).min(axis=1) / typical
+    for (end, other), least in zip(bridges, winding, strict=True):
+        facts = dict(
+            winding=float(np.clip(least, GAP.least_winding, GAP.most_winding)),
+            cap=float(np.log(_cap(end, surface) + GAP.least_cap)),
+        )
         yield (end.leaf, other), facts
 
 
@@ -92,15 +107,15 @@ def _aims(curve: Curve, end: _End, travelled: np.ndarray, leaves: list[int], alo
     cosine = across @ end.outward / away
     free = curve.degree == 1
     gap = away - np.where(free, 0, curve.radii)
-    aims = (gap < BRIDGE_REACH * end.radius) & (cosine > BRIDGE_COSINE) & (curve.degree > 0)
-    aims &= travelled > DETOUR * away
+    aims = (gap < GAP.reach * end.radius) & (cosine > GAP.cosine) & (curve.degree > 0)
+    aims &= travelled > GAP.detour * away
     cost = gap + away * (1 - cosine) / 2
     # what the way by an end leads to is behind it, and not asked for itself
-    behind = ((away[leaves][:, None] + along)[aims[leaves]] < DETOUR * away).any(axis=0)
+    behind = ((away[leaves][:, None] + along)[aims[leaves]] < GAP.detour * away).any(axis=0)
     for kind in (free, ~free & ~behind):
-        some = np.flatnonzero(aims & kind)
-        if len(some):
-            yield int(some[np.argmin(cost[some])])
+        rows = np.flatnonzero(aims & kind)
+        if len(rows):
+            yield int(rows[np.argmin(cost[rows])])
 
 
 def _cap(end: _End, surface: Surface) -> float:
@@ -108,8 +123,8 @@ def _cap(end: _End, surface: Surface) -> float:
     offset = surface.points - end.place
     ahead = offset @ end.outward
     beside = dot(offset, offset) - ahead**2
-    near = (ahead > -end.radius) & (ahead < NOT_BESIDE * end.radius)
-    near &= beside < (NOT_BESIDE * end.radius) ** 2
+    near = (ahead > -end.radius) & (ahead < CURVE.beside * end.radius)
+    near &= beside < (CURVE.beside * end.radius) ** 2
     facing = np.maximum(surface.normals[near] @ end.outward, 0)
     return float(surface.areas[near] @ facing / max(np.pi * end.radius**2, TINY))
 
@@ -121,6 +136,6 @@ def _ends(curve: Curve) -> Iterator[_End]:
         for path in (branch, branch[::-1]):
             if curve.degree[path[0]] == 1 and radius > 0:
                 places = curve.vertices[path]
-                back = int(np.searchsorted(arc_lengths(places)[1:], HEADING_RADII * radius)) + 1
-                way = places[0] - places[min(back, len(path) - 1)]
-                yield _End(int(path[0]), places[0], way / max(np.linalg.norm(way), TINY), radius)
+                back = int(np.searchsorted(arc_lengths(places)[1:], CURVE.heading * radius)) + 1
+                direction = places[0] - places[min(back, len(path) - 1)]
+                yield _End(int(path[0]), places[0], direction / max(np.linalg.norm(direction), TINY), radius)

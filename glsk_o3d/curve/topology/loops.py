@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar, NamedTuple
 
@@ -13,22 +14,34 @@ from ...data.decisions import logistic
 from ...geometry.cycles import minimum_cycle_basis, places_inside
 from ...geometry.groups import component_labels, group_rank, quantile
 from ...geometry.near_links import link_growth
+from ...geometry.numbers import fitted, precision, speed
 from ...geometry.polylines import arc_lengths
 from ...geometry.vectors import TINY
 from ..curve import Curve
-from ..diagnostics import MAJORITY
 from ..merging import collapse_triangles, drop_edges, merge_vertices
-from ..surface import LEAST_INSIDE, Evidence, Memo, Surface
-from ..thin.detect import SURFACE_GROWTH, UNSURE_CONFIDENCE, SpacedPoints
+from ..numbers import CURVE
+from ..surface import Evidence, Memo, Surface
+from ..thin.detect import SpacedPoints
 from .question import Candidate, Question
 
-WIDE_LOOP = 1.4  # fitted: surface distances, the radius of a loop that is more than two strands in one part
-WIDE_OPEN = 6.0  # fitted: spacings, its radius beyond which that says no more: crowns have wide false loops
-CLEAR_SIGHT = 3.0  # fitted: spacings, the radius of what one sees through it beyond which that says no more
-LOOP_GRID = 15  # precision: of a grid across a loop, either way
-WIDEST_FIRST = 8  # speed: places in a loop, with the widest sight, whose winding numbers are asked before others
-WIRES_ON_LOOPS = 0.9  # fitted: share of what has no surface that is on wide loops in a frame of wires; in crowns .8
-WALL_SECTORS = 16  # precision: directions around a place in which walls are looked for
+
+@dataclass(frozen=True)
+class LoopNumbers:
+    """Numbers of `Loops`."""
+
+    wide: float = fitted(1.4, "radius of a loop over the surface distance of more than two strands in one part")
+    wide_open: float = fitted(6.0, "spacings beyond which its radius says no more: crowns have wide false loops")
+    clear_sight: float = fitted(3.0, "spacings beyond which the radius of what one sees through it says no more")
+    grid: int = precision(15, "places of a grid across a loop, either way")
+    widest_first: int = speed(8, "places in a loop, with the widest sight, that are asked before others")
+    wires_on_loops: float = fitted(0.9, "share of wires that is on wide loops in a frame; in crowns .8")
+    sectors: int = precision(16, "directions around a place in which walls are looked for")
+    least_opening: float = fitted(0.5, "spacings below which an opening says no more")
+    least_passage: float = fitted(0.3, "spacings below which a passage says no more")
+    least_bonds: float = fitted(0.1, "share of the median below which bonds say no more")
+
+
+LOOP = LoopNumbers()
 
 
 class Loops(Question):
@@ -52,7 +65,7 @@ class Loops(Question):
         cycles = minimum_cycle_basis(len(curve.vertices), curve.edges, curve.edge_lengths)
         keys, thickness = [curve.vertices[cycle].tobytes() for cycle in cycles], evidence.thickness(cycles)
         radii = [surface.circle(curve.vertices[cycle])[1] for cycle in cycles]
-        narrow = [radius < WIDE_LOOP * thick for radius, thick in zip(radii, thickness, strict=True)]
+        narrow = [radius < LOOP.wide * thick for radius, thick in zip(radii, thickness, strict=True)]
         members = [set() if slim else set(cycle.tolist()) for cycle, slim in zip(cycles, narrow, strict=True)]
         if self._wires is None:
             self._wires = _is_frame_of_wires(curve, [*set[int]().union(*members)])
@@ -65,7 +78,7 @@ class Loops(Question):
             facts = partial(loop_facts, evidence=evidence)
             answered = self._known.of([keys[i] for i in asked], [cycles[i] for i in asked], facts)
             for i, loop in zip(asked, answered, strict=True):
-                if self._wires and (curve.confidence[cycles[i]] < UNSURE_CONFIDENCE).mean() > MAJORITY:
+                if self._wires and (curve.confidence[cycles[i]] < CURVE.unsure).mean() > CURVE.majority:
                     loop = loop.without_normals()
                 probability = logistic(self.weights, loop.facts) * loop.certainty
                 part = cycles[i], narrow[i], loop.weakest
@@ -102,20 +115,20 @@ class LoopFacts(NamedTuple):
     @property
     def certainty(self) -> float:
         """A factor of the probability: less where the loop has little inside, nothing as in sparse crowns."""
-        return float(np.clip(2 * self.inside / LEAST_INSIDE - 1, 0, 1))
+        return float(np.clip(2 * self.inside / CURVE.inside - 1, 0, 1))
 
     def without_normals(self) -> LoopFacts:
         """The same with bonds all around, and something inside."""
-        return self._replace(facts=self.facts | dict(bonds=float(np.log(1 + 0.1))), inside=LEAST_INSIDE)
+        return self._replace(facts=self.facts | dict(bonds=float(np.log(1 + LOOP.least_bonds))), inside=CURVE.inside)
 
 
 def _is_frame_of_wires(curve: Curve, wide: list[int]) -> bool:
     """Whether most has no surface and is on `wide` loops, as in no crown, and does not fill space, as noise does."""
-    thin = curve.confidence < UNSURE_CONFIDENCE
-    if thin.mean() <= MAJORITY or thin[wide].sum() <= WIRES_ON_LOOPS * thin.sum():
+    thin = curve.confidence < CURVE.unsure
+    if thin.mean() <= CURVE.majority or thin[wide].sum() <= LOOP.wires_on_loops * thin.sum():
         return False
     cloud = SpacedPoints(curve)
-    return bool(np.median(link_growth(cloud.links)[thin[cloud.vertex]]) < SURFACE_GROWTH)
+    return bool(np.median(link_growth(cloud.links)[thin[cloud.vertex]]) < CURVE.surface_growth)
 
 
 def loop_facts(cycles: list[np.ndarray], evidence: Evidence) -> list[LoopFacts]:
@@ -144,11 +157,11 @@ def loop_facts(cycles: list[np.ndarray], evidence: Evidence) -> list[LoopFacts]:
     for cycle, view, inside, fall in zip(cycles, views, medians, falls, strict=True):
         crossing = crossings(positions(cycle, len(curve.vertices)), len(cycle), bonds, closed=True)
         best = int(np.argmax(view.sight * fall))
-        passage = min(view.sight[best] / spacing, CLEAR_SIGHT) * min(fall[best], view.walls(best))
+        passage = min(view.sight[best] / spacing, LOOP.clear_sight) * min(fall[best], view.walls(best))
         facts = dict(
-            opening=float(np.log(min(view.radius / spacing, WIDE_OPEN) + 0.5)),
-            passage=float(np.log(passage + 0.3)),
-            bonds=float(np.log(crossing.min() / max(quantile(crossing), TINY) + 0.1)),
+            opening=float(np.log(min(view.radius / spacing, LOOP.wide_open) + LOOP.least_opening)),
+            passage=float(np.log(passage + LOOP.least_passage)),
+            bonds=float(np.log(crossing.min() / max(quantile(crossing), TINY) + LOOP.least_bonds)),
         )
         answers.append(LoopFacts(facts, inside, view.centre, int(np.argmin(crossing))))
     return answers
@@ -169,7 +182,7 @@ class _View:
 
     def __init__(self, loop: np.ndarray, thickness: float, surface: Surface) -> None:
         self.centre, self.radius = surface.circle(loop)
-        self.places, axes = places_inside(loop, LOOP_GRID)
+        self.places, axes = places_inside(loop, LOOP.grid)
         if not len(self.places):
             self.places = self.centre[None]
         self._places, self._surface, self._axes = (self.places - self.centre) @ axes[:2].T, surface, axes
@@ -194,17 +207,19 @@ class _View:
 
     def walls(self, place: int) -> float:
         """How far the nearest points all around a place face it: the mean cosine, of no points 0."""
-        way = self._points - self._places[place]
-        distance = np.hypot(*way.T)
-        sector = (WALL_SECTORS * (np.arctan2(way[:, 1], way[:, 0]) / (2 * np.pi) + 0.5)).astype(int) % WALL_SECTORS
+        offset = self._points - self._places[place]
+        distance = np.hypot(*offset.T)
+        sector = (LOOP.sectors * (np.arctan2(offset[:, 1], offset[:, 0]) / (2 * np.pi) + 0.5)).astype(
+            int
+        ) % LOOP.sectors
         order = np.lexsort([distance, sector])
         nearest = order[np.unique(sector[order], return_index=True)[1]]
         clear = self._clear[place]
-        if clear < np.inf and (len(nearest) < WALL_SECTORS or distance[nearest].max() >= clear):
+        if clear < np.inf and (len(nearest) < LOOP.sectors or distance[nearest].max() >= clear):
             self._see()
             return self.walls(place)
-        cosine = np.abs((self._normals[nearest] * way[nearest]).sum(axis=1)) / np.maximum(distance[nearest], TINY)
-        return float(cosine.sum() / WALL_SECTORS)
+        cosine = np.abs((self._normals[nearest] * offset[nearest]).sum(axis=1)) / np.maximum(distance[nearest], TINY)
+        return float(cosine.sum() / LOOP.sectors)
 
 
 def _falls(views: list[_View], inside: np.ndarray, surface: Surface) -> list[np.ndarray]:
@@ -217,11 +232,11 @@ def _falls(views: list[_View], inside: np.ndarray, surface: Surface) -> list[np.
     sizes = [len(view.places) for view in views]
     loop, fall, unasked = np.repeat(np.arange(len(views)), sizes), np.zeros(len(places)), np.ones(len(places), bool)
     order = np.lexsort([-sight, loop])
-    first = order[group_rank(loop, len(views)) < WIDEST_FIRST]
+    first = order[group_rank(loop, len(views)) < LOOP.widest_first]
     for _ in range(2):
         unasked[first] = False
         there = surface.winding(places[first])
-        fall[first] = np.clip(1 - there / np.maximum(inside[loop[first]], LEAST_INSIDE), 0, 1)
+        fall[first] = np.clip(1 - there / np.maximum(inside[loop[first]], CURVE.inside), 0, 1)
         best = np.zeros(len(views))
         np.maximum.at(best, loop, sight * fall)
         first = np.flatnonzero(unasked & (sight >= best[loop]))

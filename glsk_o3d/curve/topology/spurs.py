@@ -1,6 +1,7 @@
 """Spurs: which branches are limbs, and which hardly leave the part that they grow from?"""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar
 
@@ -9,22 +10,33 @@ import numpy as np
 from ...data.decisions import logistic
 from ...geometry.groups import quantile
 from ...geometry.neighbourhoods import plane_axes
+from ...geometry.numbers import derived, fitted, precision, speed
 from ...geometry.polylines import arc_lengths, place_at, relative_distance
 from ...geometry.vectors import TINY, Ints, cross, norm, unit
 from ..curve import Curve
 from ..limbs import JunctionLimbs
 from ..merging import merge_into
+from ..numbers import CURVE
 from ..surface import Evidence, Memo, Surface
 from .question import Candidate, Question
 
-SPUR_POINTS = 128  # speed: of a branch that are enough to say how far it reaches
-SPUR_QUANTILE = 0.9  # fitted: share of a spur's points that its reach covers
-LEAST_OUT = 0.3  # fitted: half widths below which a protrusion says no more
-LONG_OUTSIDE = 4.0  # derived: half widths of a part that is twice as long as it is wide
-NOT_BESIDE = 2.0  # fitted: half widths from a curve to where nothing is beside it, nor the cap of its end
-SLENDEREST, STOUTEST = 0.2, 2.0  # derived: of radii, beyond which a branch is no more or less of a limb
+
+@dataclass(frozen=True)
+class LimbNumbers:
+    """Numbers of `Limbs`."""
+
+    points: int = speed(128, "points of a branch that are enough to say how far it reaches")
+    quantile: float = fitted(0.9, "share of a spur's points that its reach covers")
+    least_out: float = fitted(0.3, "half widths below which a protrusion says no more")
+    long: float = derived(4.0, "half widths of a part that is twice as long as it is wide")
+    slenderest: float = derived(0.2, "radius over that of the junction below which a branch is no more of a limb")
+    stoutest: float = derived(2.0, "the same above which it is no less of one")
+    directions: int = precision(16, "directions across a branch; eight are enough for flat parts")
+
+
+LIMB = LimbNumbers()
+
 OUTER_PLACES = np.linspace(1 / 3, 1, 5)  # measured: of the length; each but the first and last is asked
-ACROSS = 16  # precision: directions across a branch; eight are enough for flat parts
 
 
 class Limbs(Question):
@@ -116,11 +128,11 @@ def _facts(
         junction, body = int(path[0]), path[1:]
         own = cloud.points[cloud.members.of(part)]
         # by how far they are, and not as they come, which depends on how the object is turned
-        points = own[np.argsort(norm(own - curve.vertices[junction]))][:: len(own) // SPUR_POINTS + 1]
+        points = own[np.argsort(norm(own - curve.vertices[junction]))][:: len(own) // LIMB.points + 1]
         out = max(_standing_out(limbs, k, junction, points, ending), 0.0) if own_half > 0 else 0.0
         thickness = np.average(radius[part], weights=count[part]) / max(distance[junction], TINY)
-        ratio = np.clip(thickness, SLENDEREST, STOUTEST)
-        protrusion = float(np.log(out / max(own_half, TINY) + LEAST_OUT))
+        ratio = np.clip(thickness, LIMB.slenderest, LIMB.stoutest)
+        protrusion = float(np.log(out / max(own_half, TINY) + LIMB.least_out))
         yield dict(
             protrusion=protrusion - float(shared) * max(protrusion, 0),
             certainty=-float(np.log1p(-np.average(confidence[body], weights=count[body]))),
@@ -136,7 +148,7 @@ def _outside(vertices: np.ndarray, path: np.ndarray, surface: float, wide: np.nd
     body = path[1:]
     away = norm(vertices[body] - vertices[path[0]])
     part = body[np.flatnonzero(away <= surface).max(initial=-1) + 1 :]
-    return part if len(part) and away[-1] - surface > LONG_OUTSIDE * quantile(wide[part]) else body
+    return part if len(part) and away[-1] - surface > LIMB.long * quantile(wide[part]) else body
 
 
 def _beside(
@@ -160,9 +172,9 @@ def _beside(
     second = cross(tangent, width[np.concatenate(near)])
     # the width of a vertex without points is any direction, also along the branch
     second = unit(np.where(norm(second)[:, None] > 1e-6, second, plane_axes(tangent)[:, :, 0]))
-    turn = np.linspace(0, 2 * np.pi, ACROSS, endpoint=False)[:, None, None]
+    turn = np.linspace(0, 2 * np.pi, LIMB.directions, endpoint=False)[:, None, None]
     across = np.cos(turn) * cross(second, tangent) + np.sin(turn) * second
-    away = NOT_BESIDE * half[:, None, None] * across.reshape(ACROSS, len(paths), -1, 3)
+    away = CURVE.beside * half[:, None, None] * across.reshape(LIMB.directions, len(paths), -1, 3)
     beside = places[:, 1:-1] + away
     winding = surface.winding(beside.reshape(-1, 3)).reshape(beside.shape[:-1])
     inside: np.ndarray = np.clip(winding.max(axis=0), 0, 1).mean(axis=1)
@@ -182,4 +194,4 @@ def _standing_out(limbs: JunctionLimbs, k: int, junction: int, points: np.ndarra
     more = len(limbs.vertices) + np.arange(2 * len(longer)).reshape(2, -1).T
     paths = [*(limbs.paths[i] for i in around), *more]
     ratio, there = relative_distance(points, vertices, np.r_[surface, radius, radius], paths)
-    return quantile((ratio - 1) * there, SPUR_QUANTILE)
+    return quantile((ratio - 1) * there, LIMB.quantile)

@@ -18,6 +18,8 @@ from ...data.skeleton import ARRAYS, Skeleton, of_input
 from ..paths import check_budget, check_promised
 
 FORMAT, FORMAT_VERSION = "glsk-o3d skeleton", 1
+REPRESENTATIVES = "representative_of_point"
+"""An array that only skeletons have that are to be refined."""
 
 
 def write_json(skeleton: Skeleton) -> bytes:
@@ -67,6 +69,8 @@ def dumps(value: Any) -> str:
 
 def _arrays(skeleton: Skeleton) -> dict[str, Any]:
     arrays = {name: getattr(skeleton.whole, name) for name in ARRAYS}
+    if (arrays[REPRESENTATIVES] < 0).all():  # as of finished skeletons
+        del arrays[REPRESENTATIVES]
     return {"format": FORMAT, "format_version": FORMAT_VERSION, **arrays}
 
 
@@ -76,6 +80,7 @@ def _decode(values: Any) -> Skeleton:
         raise ValueError(f"it is not marked as a {FORMAT!r}")
     if (version := values.get("format_version")) != FORMAT_VERSION:
         raise ValueError(f"it has format_version {version!r} and this release reads {FORMAT_VERSION}: update glsk-o3d")
+    values = {REPRESENTATIVES: []} | values
     missing = [name for name in (*ARRAYS, "report") if name not in values]
     if missing:
         raise ValueError(f"it lacks {', '.join(missing)}")

@@ -36,7 +36,7 @@ def convex_rings(points, faces):
 def test_our_rows_are_twice_libigls_where_the_rings_are_the_same(even_ball):
     points, faces = even_ball(700)
     state = (Sampler(frame="box") | RingBuilder())(points)
-    faces, cloud = state.representative_of_point[faces], state.frame.out_of(state.cloud)
+    faces, cloud = state.map.row_of_point[faces], state.frame.out_of(state.cloud)
     mesh = convex_rings(cloud, faces)
     same = np.array([{*state.rings[i]} == {*mesh[i]} for i in range(700)])
     assert same.mean() > 0.95  # the others lie on squares, which have two diagonals
@@ -113,7 +113,7 @@ def test_it_starts_from_medial_places():
     middle = np.abs(place[:, 2]) < 0.5
     assert np.median(np.linalg.norm(place[middle], axis=1)) < 0.75  # the surface is at 1
     area = igl.massmatrix(solid.vertices, solid.faces).diagonal()
-    mass = begun.mass[begun.representative_of_point]
+    mass = begun.mass[begun.map.row_of_point]
     np.testing.assert_allclose(mass, np.maximum(area / area.mean(), 0.05), rtol=1e-9)
 
 

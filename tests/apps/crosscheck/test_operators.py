@@ -49,7 +49,7 @@ def flat_torus(side):
     ours, state = of_rings(places)
     mesh = of_mesh(places, Delaunay(plane).simplices.astype(np.int64))
     number = np.empty(len(plane), int)
-    number[state.representative_of_point] = numbers
+    number[state.map.row_of_point] = numbers
     return folded_up(ours, number, side**2), folded_up(mesh, numbers, side**2)
 
 
@@ -159,7 +159,7 @@ def test_a_plane_and_nothing_else():
     solid = Solid(place, Delaunay(place[:, :2]).simplices.astype(np.int64), "given")
     ours = ring_operator(place, state.rings)
     angle, found = compare_operators(ours, state.rings, up, mesh_operator(solid), solid)
-    inner = np.abs(flat[state.point_of_survivor, :2] - 0.5).max(axis=1) < 0.2
+    inner = np.abs(flat[state.map.point_of_survivor, :2] - 0.5).max(axis=1) < 0.2
     assert (angle[inner] == 0).all()
     assert found.flat == (angle == 0).sum()
 

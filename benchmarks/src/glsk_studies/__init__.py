@@ -1,0 +1,1 @@
+"""Studies of the package: accuracy, speed, other tools. Each is run by the script of its name in `benchmarks`."""

@@ -1,0 +1,368 @@
+"""The benchmark's scores of several tools: kept beside the code, as tables of docs/comparison.md, and drawn."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from itertools import product
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import typer
+from glsk_bench import BenchmarkFolder, Repeat, Results, read_results
+from glsk_bench.repeating import PLACES
+from glsk_bench.scoring import OF_THINGS, answer_files
+from glsk_bench.table import mean_with_interval, told
+
+from glsk_o3d import plot_skeleton, read_cloud, read_skeleton
+from glsk_o3d.interop.atomic import write_json
+from glsk_o3d.interop.clouds import cloud_points
+from glsk_o3d.recipes.catalogue import named_pipeline
+
+from .peers import PEERS, skeleton_of
+from .tables import BLUE, ORANGE, ROOT, Table, keep, number, read, save_figure, sheet, write_packed
+
+KEPT = ROOT / "benchmarks"  # a folder of it for each version of the benchmark
+DECIMALS = 4  # of what is kept, far more than intervals are wide
+GOLDEN = ROOT / "tests" / "golden"
+KNOWN = {"y_unequal": (1, 0, 3), "torus": (1, 1, 0), "quadruped": (1, 0, 6)}  # components, loops, leaves
+
+OURS = "default"
+LEAST_SHAPES = 3  # of which a difference is told
+MEASURES = {  # what may be lost, its digits, and whether more of it is better; of what has a sign, its size counts
+    "perfect": ("perfect", 2, True),
+    "topology": ("topology", 2, True),
+    "tips_f1": ("tips F1", 2, True),
+    "junctions_f1": ("junctions F1", 2, True),
+    "error": ("error", 3, False),
+    "inside": ("inside", 3, True),
+    "completeness": ("completeness", 3, True),
+    "ends": ("ends", 2, False),
+    "hooks": ("hooks", 2, False),
+    "reach": ("reach", 2, False),
+    "wiggle": ("wiggle", 3, False),
+    "mirror": ("mirror", 3, False),
+    "junction_offset": ("junction offset", 2, False),
+}
+SHORT = {"clean": "clean", "scan2": "two cameras", "noise1": "1 % noise"}
+NUMBER = re.compile(r"(?<!code )(?<!signal )\d+(?:\.\d+)?")  # of a reason; those of codes and signals are names
+VIEW = (14, -60)  # elevation and azimuth, in degrees
+SPREAD = ("moved", "agree", "loops", "ends")  # of several clouds of an object, with intervals
+
+Seconds = dict[str, dict[str, Any]]
+
+
+class Entry(NamedTuple):
+    """A tool's scores, and how its answers were made: commit, machine, versions, limit in seconds, hours of all."""
+
+    results: Results
+    made: dict[str, Any]
+
+    @property
+    def tool(self) -> str:
+        return self.results.name
+
+
+def keep_scores(results: Results, made: Mapping[str, Any]) -> Path:
+    """Write the scores of a tool, packed; gives the path."""
+    rows = [
+        {name: round(value, DECIMALS) if isinstance(value, float) else value for name, value in row.items()}
+        for row in results.rows
+    ]
+    hours = round(sum(row["seconds"] or 0 for row in rows) / 3600, 2)
+    told = {"benchmark": results.benchmark, "name": results.name, "whole": results.whole, "clouds": rows}
+    path = kept_in(results.benchmark) / f"{results.name}.json.gz"
+    write_packed(path, {**told, "made": {**made, "hours": hours}})
+    return path
+
+
+def kept_in(version: str) -> Path:
+    """The folder of what is kept of a version of the benchmark."""
+    (KEPT / version).mkdir(exist_ok=True)
+    return KEPT / version
+
+
+def kept(version: str) -> list[Entry]:
+    """All scores that are kept, in the order of the tools."""
+    paths = {name: KEPT / version / f"{name}.json.gz" for name in PEERS}
+    return [Entry(read_results(path), read(path)["made"]) for path in paths.values() if path.is_file()]
+
+
+def keep_seconds(version: str, found: Seconds) -> None:
+    """Keep the median CPU seconds `cpu` of some tools, and `where` they were measured, beside those of others."""
+    write_json(kept_in(version) / "seconds.json", seconds(version) | found)
+
+
+def seconds(version: str) -> Seconds:
+    """What `keep_seconds` has kept."""
+    path = KEPT / version / "seconds.json"
+    return read(path) if path.is_file() else {}
+
+
+def keep_repeat(version: str, objects: str, found: Repeat, made: Mapping[str, Any]) -> Path:
+    """Keep how far a tool's answers to several clouds of each object are apart, beside those of others."""
+    path = kept_in(version) / f"repeat_{objects}.json.gz"
+    before = read(path) if path.is_file() else {}
+    if any(each["benchmark"] != found.benchmark for name, each in before.items() if name != found.name):
+        raise typer.BadParameter(f"{path} has other clouds: remove it, and run all tools anew")
+    write_packed(path, before | {found.name: {**found.as_dict(), "made": dict(made)}})
+    return path
+
+
+def repeats(version: str, objects: str) -> list[Repeat]:
+    """What `keep_repeat` has kept, in the order of the tools."""
+    path = KEPT / version / f"repeat_{objects}.json.gz"
+    found = read(path) if path.is_file() else {}
+    return [Repeat(found[name]["benchmark"], name, found[name]["objects"]) for name in PEERS if name in found]
+
+
+def recorded() -> Table:
+    """Components, loops and leaves of what was recorded of the authors' code, and of ours from the same points."""
+    lines = {"right": [" / ".join(map(str, known)) for known in KNOWN.values()]}
+    for shape in KNOWN:
+        with np.load(GOLDEN / f"{shape}_1024.npz") as file:
+            arrays = dict(file)
+        theirs = {"published code": "skeleton", "its baseline of 2010": "cao_skeleton"}
+        found = {
+            name: skeleton_of(arrays[f"{word}_vertices"], arrays[f"{word}_edges"]) for name, word in theirs.items()
+        }
+        names = ("wen2024", "cao2010", "default")
+        found |= {f"`{name}`": named_pipeline(name)(arrays["points"]) for name in names}
+        for name, it in found.items():
+            lines.setdefault(name, []).append(f"{it.n_components} / {it.n_loops} / {len(it.leaves)}")
+    return "components / loops / leaves", ["", *KNOWN], [[name, *cells] for name, cells in lines.items()]
+
+
+def overview(board: Sequence[dict[str, Any]], cpu: Seconds) -> Table:
+    """All tools over all clouds, the best first: the entries of a `Leaderboard`."""
+    lines, more = [], [name for name in OF_THINGS if name in MEASURES and any(entry["all"][name] for entry in board)]
+    for entry in board:
+        name, mean = entry["name"], entry["all"]
+        shares = [told(*mean[measure]) for measure in ("perfect", "topology")]
+        plain = [number(mean[measure][0], 2) for measure in ("tips_f1", "junctions_f1")]
+        error = told(*mean["error"], 3) if mean["error"] else "-"
+        rest = [number(mean[measure] and mean[measure][0], 3) for measure in ("inside", "completeness")]
+        rest += [told(*mean[it], MEASURES[it][1]) if mean[it] else "-" for it in more]
+        lines.append([*_label(name), *shares, *plain, error, *rest, str(mean["failures"]), _cpu(cpu, name)])
+    heads = ["tips F1", "junctions F1", "error", "inside", "complete"]
+    heads += [*(MEASURES[it][0] for it in more), "failures", "CPU s"]
+    first = board[0]["all"]
+    title = f"{first['clouds']} clouds of {first['shapes']} random shapes"
+    return title, ["", "takes", "perfect", "topology", *heads], lines
+
+
+def short(board: Sequence[dict[str, Any]], cpu: Seconds) -> Table:
+    """The same in few columns, with the best way to run each tool alone."""
+    best: dict[str, list[str]] = {}
+    for entry in board:
+        name, mean, groups = entry["name"], entry["all"], entry["variants"]
+        tool = _label(name)[0].partition(",")[0]
+        shares = [number(groups[it]["topology"][0], 2) for it in SHORT if it in groups]
+        error = number(mean["error"] and mean["error"][0], 2)
+        cells = [*shares, number(mean["topology"][0], 2), number(mean["perfect"][0], 2), error]
+        best.setdefault(tool, [tool, *cells, _cpu(cpu, name)])
+    kinds = [words for it, words in SHORT.items() if it in board[0]["variants"]]
+    heads = ["", *kinds, f"all {len(board[0]['variants'])} kinds", "perfect", "error", "CPU s"]
+    return "right components and loops, share of the clouds", heads, list(best.values())
+
+
+class Worse(NamedTuple):
+    """Where the mean of `default` is worse than that of another tool."""
+
+    clouds: str  # all, a variant or a family
+    tool: str
+    measure: str
+    shapes: int
+    means: list[float]  # theirs, ours
+    difference: tuple[float, float, float]  # with its interval
+
+    @property
+    def clear(self) -> bool:
+        """Whether the interval leaves out 0 as it is told."""
+        _, low, high = self.difference
+        digits = MEASURES[self.measure][1]
+        return round(low, digits) * round(high, digits) > 0
+
+
+def worse(entries: Sequence[Entry]) -> list[Worse]:
+    """All of these, by clouds, tool and measure; fewer than three shapes have no interval to speak of."""
+    by_name = {entry.tool: {(row["shape"], row["variant"]): row for row in entry.results.rows} for entry in entries}
+    ours, found = by_name.pop(OURS), []
+    groups: dict[str, list] = {"all": [*ours]}
+    for part in ("variant", "family"):
+        for key, row in ours.items():
+            groups.setdefault(row[part], []).append(key)
+    for (group, here), (name, theirs), measure in product(groups.items(), by_name.items(), MEASURES):
+        pairs = [(theirs[key][measure], ours[key][measure]) for key in here]
+        pairs = [(abs(a), abs(b)) if None not in (a, b) else None for a, b in pairs]
+        known = [(key[0], pair) for key, pair in zip(here, pairs, strict=True) if pair]
+        if len({shape for shape, _ in known}) >= LEAST_SHAPES:
+            shapes, both = zip(*known, strict=True)
+            difference = mean_with_interval(shapes, [other - mine for other, mine in both])
+            _, digits, more = MEASURES[measure]
+            if round(difference[0] if more else -difference[0], digits) > 0:
+                means = [sum(side) / len(both) for side in zip(*both, strict=True)]
+                found.append(Worse(group, name, measure, len({*shapes}), means, difference))
+    return found
+
+
+def losses(found: Sequence[Worse]) -> Table:
+    """Where `default` is worse than another tool, whatever shapes are drawn: intervals without 0."""
+    lines = []
+    for it in found:
+        if it.clear:
+            words, digits, _ = MEASURES[it.measure]
+            means = [number(mean, digits) for mean in it.means]
+            difference = told(*it.difference, digits, sign="+")
+            lines.append([it.clouds, str(it.shapes), words, _from(it.tool), *means, difference])
+    header = ["clouds", "shapes", "measure", "to", "theirs", "`default`", "difference"]
+    return "where `default` is worse", header, lines
+
+
+def unclear(found: Sequence[Worse]) -> Table:
+    """Where the mean of `default` is worse, and other shapes could turn it: intervals with 0."""
+    groups: dict[tuple[str, str], list[str]] = {}
+    for it in found:
+        if not it.clear:
+            words, digits, _ = MEASURES[it.measure]
+            groups.setdefault((words, _from(it.tool)), []).append(f"{it.clouds} ({it.difference[0]:+.{digits}f})")
+    lines = [[*key, ", ".join(places)] for key, places in groups.items()]
+    return "where only the mean of `default` is worse", ["measure", "to", "which"], lines
+
+
+def by_group(entries: Sequence[Entry], group: str, measure: str, digits: int, title: str) -> Table:
+    """The mean of a measure for each tool, by variant or by family, with intervals."""
+    rows = entries[0].results.rows
+    names = list(dict.fromkeys(row[group] for row in rows))
+    sizes = Counter(row[group] for row in rows)
+    lines = []
+    for entry in entries:
+        cells = []
+        for name in names:
+            known = [row for row in entry.results.rows if row[group] == name and row[measure] is not None]
+            found = mean_with_interval([row["shape"] for row in known], [row[measure] for row in known])
+            cells.append(told(*found, digits))
+        lines.append([*_label(entry.tool), *cells])
+    return title, ["", "takes", *(f"{name} ({sizes[name]})" for name in names)], lines
+
+
+def repeated(found: Sequence[Repeat]) -> Table:
+    """How far the answers to several clouds of each object are apart, the nearest first."""
+    lines = []
+    for means, it in sorted(((each.means(), each) for each in found), key=lambda both: _last(both[0]["moved"])):
+        shown = {name: [(row["object"], row[name]) for row in it.rows if row[name] is not None] for name in SPREAD}
+        cells = {
+            name: told(*mean_with_interval(*zip(*rows, strict=True))) if rows else "-" for name, rows in shown.items()
+        }
+        where = [number((means["where"] or {}).get(place), 2) for place in PLACES]
+        moved = [cells["moved"], number(means["median"], 2), *where]
+        rest = [*(cells[name] for name in ("agree", "loops", "ends")), number(means["hooks"], 2)]
+        lines.append([*_label(it.name), *moved, *rest, str(means["failures"])])
+    means = found[0].means()
+    heads = ["moved", "median", "near ends", "near junctions", "elsewhere", "limbs", "agree", "loops", "ends", "hooks"]
+    title = f"{means['draws']} clouds of {means['objects']} objects"
+    return title, ["", "takes", *heads, "failures"], lines
+
+
+def _last(value: float | None) -> float:
+    return float("inf") if value is None else value
+
+
+def failures(entries: Sequence[Entry]) -> Table:
+    """Which clouds have no answer, by tool and reason."""
+    lines = []
+    for entry in entries:
+        groups: dict[str, list[tuple[str, str]]] = {}  # by the words of the reason, whatever its numbers
+        for row in entry.results.rows:
+            if row["failure"] is not None:
+                reason = row["failure"].removeprefix("no answer: ").replace("|", "/").split("\n")[0]
+                groups.setdefault(NUMBER.sub("#", reason), []).append((reason, f"{row['shape']}_{row['variant']}"))
+        for group in groups.values():
+            reasons, names = zip(*group, strict=True)
+            lines.append([*_label(entry.tool), _span(reasons), str(len(names)), ", ".join(names)])
+    return "failures", ["", "takes", "why", "clouds", "which"], lines
+
+
+def runs(entries: Sequence[Entry]) -> Table:
+    """What the runs took, and what was run."""
+    lines = []
+    for entry in entries:
+        made = entry.made
+        packages = ", ".join(f"{name} {version}" for name, version in made["packages"].items()) or "glsk-o3d"
+        lines.append([*_label(entry.tool), packages, made["commit"] or "-", number(made["hours"], 2)])
+    hours = sum(entry.made["hours"] for entry in entries)
+    return "runs", ["", "takes", "packages", "commit", "hours"], [*lines, ["all", "", "", "", number(hours, 1)]]
+
+
+def _cpu(cpu: Seconds, name: str) -> str:
+    return number(cpu[name]["cpu"], 2) if name in cpu else "-"
+
+
+def _from(name: str) -> str:
+    return " of ".join(_label(name))
+
+
+def _label(name: str) -> tuple[str, str]:
+    return PEERS[name].label, PEERS[name].takes
+
+
+def _span(reasons: Sequence[str]) -> str:
+    """What all say in the same words, with the least and the most of each number."""
+    spans = []
+    for column in zip(*map(NUMBER.findall, reasons), strict=True):
+        least, most = min(column, key=float), max(column, key=float)
+        spans.append(least if least == most else f"{least} to {most}")
+    each = iter(spans)
+    return NUMBER.sub(lambda _: next(each), reasons[0])
+
+
+def draw_board(rows: list[dict[str, Any]], folder: Path, name: str) -> None:
+    """The entries of a `Leaderboard`, with intervals: right topologies and perfect ones, and errors; as NAME.png."""
+    places = np.arange(len(rows))
+    figure, (left, right) = sheet(1.1 + 0.27 * len(rows), columns=2, sharey=True, width=7.0)
+    for axes, measures in ((left, ("topology", "perfect")), (right, ("error",))):
+        axes.hlines(places, 0, 1, transform=axes.get_yaxis_transform(), color="#e4e4e4", linewidth=0.8, zorder=0)
+        axes.tick_params(axis="y", length=0)
+        for measure in measures:
+            means, low, high = np.transpose([row["all"][measure] or [np.nan] * 3 for row in rows])
+            style = dict(color=ORANGE if measure == "perfect" else BLUE)
+            axes.hlines(places, low, high, linewidth=2, **style)
+            axes.plot(means, places, "o", markersize=5, label=measure if axes is left else None, **style)
+    left.set(xlabel="share of all clouds", xlim=(-0.02, 1), ylim=(len(rows) - 0.5, -0.5))
+    left.set_yticks(places, [title(row["name"]) for row in rows])
+    right.set(xlabel="mean error, local radii", xscale="log")
+    ticks = [0.1, 0.2, 0.5, 1, 2, 5]
+    right.set_xticks(ticks, map(str, ticks))
+    right.minorticks_off()
+    figure.legend(loc="outside upper center", ncols=3, frameon=False)
+    keep(figure, folder, name)
+
+
+def title(name: str) -> str:
+    """A tool as pictures name it."""
+    peer = PEERS[name]
+    return peer.label.strip("`") if peer.takes == "points" else f"{peer.label}, {peer.takes.split()[-1]}"
+
+
+def draw_answers(bench: BenchmarkFolder, answers: Path, cloud: str, entries: list[Entry], path: Path) -> None:
+    """The skeletons of a cloud, three in a row, each with its error and what is wrong with its topology."""
+    (where,) = (each.path for each in bench.clouds if each.name == cloud)
+    points, lines = cloud_points(read_cloud(where)), -(-len(entries) // 3)
+    figure, _ = sheet(2.7 * lines, lines, 3, width=10.2, subplot_kw=dict(projection="3d"))
+    for axes, entry in zip(figure.axes, entries, strict=False):
+        found = answer_files(answers / entry.tool).get(cloud)
+        plot_skeleton(read_skeleton(found[0]) if found else None, axes, cloud=points, view=VIEW)
+        axes.set_title(caption(entry, cloud), fontsize=9)
+    save_figure(figure, path)
+
+
+def caption(entry: Entry, cloud: str) -> str:
+    """What stands above a skeleton."""
+    (row,) = (row for row in entry.results.rows if f"{row['shape']}_{row['variant']}" == cloud)
+    label = title(entry.tool)
+    if row["failure"] is not None:
+        return f"{label}\n{row['failure']}"
+    off = ", ".join(f"{name} {row[name]:+d}" for name in ("components", "loops") if row[name])
+    return f"{label}\nerror {row['error']:.2f}, {off or 'right topology'}"

@@ -1,0 +1,303 @@
+"""Probabilities of the refiner's decisions: their weights fitted, and whether what they predict holds as often.
+
+python benchmarks/calibrate.py check --builtin --variant clean_1024,noise2_1024
+
+The README of the benchmarks says what each command shows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, NamedTuple
+
+import numpy as np
+import typer
+from glsk_bench.table import mean_with_interval, told
+from scipy.optimize import minimize
+from scipy.special import expit
+from scipy.stats import rankdata
+
+from glsk_o3d.analysis import compare
+from glsk_o3d.data.decisions import logistic
+from glsk_o3d.filters.refiner import QUESTIONS as ORDER
+from glsk_o3d.pipelines import default
+
+from .clouds import Case, cases
+from .questions import questions
+from .runs import Jobs, Markdown, Output, Own, Saved, Shapes, Variants, application, run, study
+from .tables import BLUE, GREY, Table, Tables, fill, keep, number, page_with, pick, present, read, save, sheet
+
+PENALTY = 1.0  # of half a weight's square, as if it were drawn from a normal distribution; the constant has none
+
+PARTS = 5  # of the range of probabilities, of the same width
+SURE = 1e-9  # a probability is taken to be as far from 0 and 1, or one mistake would make the loss infinite
+ASKED = {question.about: question for question in ORDER}
+QUESTIONS = {
+    "loop": "a loop is a handle",
+    "air": "a branch crosses air",
+    "gap": "the object goes on across a gap",
+    "limb": "a branch is a limb",
+}
+SEEN, UNSEEN = "all families", "the other families"  # to which weights are fitted
+MEASURES = ("topology", "perfect")
+Weights = dict[str, dict[str, float]]
+EVERY = "*_4096"
+Sources = Annotated[
+    list[Path] | None,
+    typer.Argument(metavar="DIR|JSON", exists=True, help="Folders of shapes, or questions that -o has written."),
+]
+
+app = application(__doc__)
+
+
+class Answered(NamedTuple):
+    """Questions of one kind: their facts, whether it is so, and of which shapes and families they are."""
+
+    names: list[str]
+    facts: np.ndarray
+    is_so: np.ndarray
+    shapes: np.ndarray
+    families: np.ndarray
+
+    def of(self, some: np.ndarray) -> Answered:
+        return Answered(self.names, *(each[some] for each in self[1:]))
+
+
+def by_question(rows: list[dict]) -> dict[str, Answered]:
+    """The questions of all clouds, by what they are about."""
+    found: dict[str, list[tuple]] = {about: [] for about in QUESTIONS}
+    for row in rows:
+        for it in row.get("questions", ()):
+            found[it["about"]].append((it["facts"], it["is_so"], row["shape"], row["family"]))
+    told = {}
+    for about, each in found.items():
+        if each:
+            facts, is_so, shapes, families = zip(*each, strict=True)
+            names = list(facts[0])
+            table = np.array([[fact[name] for name in names] for fact in facts])
+            told[about] = Answered(names, table, np.array(is_so), np.array(shapes), np.array(families))
+    return told
+
+
+def fitted(answered: Answered) -> dict[str, float]:
+    """The weights with which the questions are answered best: least log loss, with a light L2 penalty."""
+    table = np.column_stack([np.ones(len(answered.facts)), answered.facts])
+    penalty = PENALTY * np.append(0, np.ones(len(answered.names)))
+
+    def loss(weights):
+        total = table @ weights
+        value = np.logaddexp(0, np.where(answered.is_so, -total, total)).sum() + penalty @ weights**2 / 2
+        return value, table.T @ (expit(total) - answered.is_so) + penalty * weights
+
+    found = minimize(loss, np.zeros(table.shape[1]), jac=True, method="BFGS").x
+    return dict(zip(["constant", *answered.names], found.tolist(), strict=True))
+
+
+def said(weights: Mapping[str, float], answered: Answered) -> np.ndarray:
+    """Probabilities, (n,) float array."""
+    return np.array([logistic(weights, dict(zip(answered.names, it, strict=True))) for it in answered.facts])
+
+
+def log_loss(chance: np.ndarray, is_so: np.ndarray) -> float:
+    """Mean of minus the logarithm of the probability of what is so, in nats."""
+    chance = np.clip(chance, SURE, 1 - SURE)
+    return float(-np.log(np.where(is_so, chance, 1 - chance)).mean())
+
+
+def area_under_curve(chance: np.ndarray, is_so: np.ndarray) -> float:
+    """The share of pairs, of one that is so and one that is not, in which that has the larger probability; ties half.
+
+    NaN without such pairs.
+    """
+    n, m = np.count_nonzero(is_so), np.count_nonzero(~is_so)
+    return (rankdata(chance)[is_so].sum() - n * (n + 1) / 2) / (n * m) if n and m else np.nan
+
+
+def parts(chance: np.ndarray, answered: Answered) -> list[tuple[int, float, tuple[float, float, float]]]:
+    """Of every part of the range that is not empty: the count, the mean probability, and how often it is so."""
+    part, found = np.minimum((chance * PARTS).astype(int), PARTS - 1), []
+    for k in np.unique(part):
+        here = part == k
+        often = mean_with_interval(answered.shapes[here].tolist(), answered.is_so[here].tolist())
+        found.append((int(here.sum()), float(chance[here].mean()), often))
+    return found
+
+
+def tables(told_of: Mapping[str, tuple[np.ndarray, Answered]]) -> Tables:
+    """A line for each kind of question; what is said and how often it is so, by parts of the range; and by family."""
+    kinds, ranges, families = [], [], []
+    for about, (chance, answered) in told_of.items():
+        question, is_so = QUESTIONS[about], answered.is_so
+        asked, so, probability, *losses = _judged(chance, is_so)
+        kinds.append([question, asked, so, probability, number(((chance >= 0.5) == is_so).mean()), *losses])
+        for place, (count, mean, often) in enumerate(parts(chance, answered)):
+            ranges.append([question * (place == 0), str(count), number(mean, 2), told(*often)])
+        for place, family in enumerate(dict.fromkeys(answered.families.tolist())):
+            here = answered.families == family
+            families.append([question * (place == 0), family, *_judged(chance[here], is_so[here])])
+    first, last = ["asked", "so", "said"], ["log loss", "of the share", "AUC"]
+    return [
+        ("by question", ["the question", *first, "right at .5", *last], kinds),
+        ("said, and so how often", ["the question", "asked", "said", "so"], ranges),
+        ("by family", ["the question", "family", *first, *last], families),
+    ]
+
+
+def _judged(chance, is_so):
+    """How many there are, how often it is so, what is said on average, and how good that is."""
+    shares = [number(is_so.mean()), number(chance.mean())]
+    losses = [number(log_loss(chance, is_so)), number(log_loss(np.full(len(is_so), is_so.mean()), is_so))]
+    return [str(len(is_so)), *shares, *losses, number(area_under_curve(chance, is_so))]
+
+
+def without_family(answered: Answered, learnt: Answered) -> np.ndarray:
+    """What weights say of each family that were fitted without it, to other questions, (n,) float array."""
+    chances = np.empty(len(answered.is_so))
+    for family in np.unique(answered.families):
+        here = answered.families == family
+        chances[here] = said(fitted(learnt.of(learnt.families != family)), answered.of(here))
+    return chances
+
+
+def draw_reliability(told_of: Mapping[str, tuple[np.ndarray, Answered]], folder: Path) -> None:
+    """How often it is so over the probability that was said, a panel for each kind of question, with counts."""
+    figure, panels = sheet(5.4, rows=2, columns=2, sharex=True, sharey=True)
+    for axes, (about, question) in zip(panels.ravel(), QUESTIONS.items(), strict=True):
+        axes.plot([0, 1], [0, 1], color=GREY, linewidth=0.8, zorder=0)
+        axes.set_title(question, fontsize=9)
+        axes.set(xlim=(-0.03, 1.03), ylim=(-0.03, 1.03), aspect="equal")
+        for count, mean, (often, low, high) in parts(*told_of[about]) if about in told_of else ():
+            axes.vlines(mean, low, high, color=BLUE, linewidth=1.5)
+            axes.plot(mean, often, "o", color=BLUE, markersize=5)
+            right = mean < 0.8  # of the dot, or there is no room
+            style = dict(textcoords="offset points", fontsize=7, color=GREY, va="center")
+            axes.annotate(str(count), (mean, often), (6 if right else -6, 0), ha="left" if right else "right", **style)
+    figure.supxlabel("probability that was said", fontsize=9)
+    figure.supylabel("how often it was so", fontsize=9)
+    keep(figure, folder, "probabilities")
+
+
+def weights_of(answered: Mapping[str, Answered], without: str | None = None) -> Weights:
+    """By question: fitted to all questions, or to those of all families but one."""
+    some = {about: it if without is None else it.of(it.families != without) for about, it in answered.items()}
+    return {about: fitted(it) for about, it in some.items()}
+
+
+def measure(case: Case, weights: Weights) -> dict[str, float]:
+    """A skeleton of `default` with these weights, against its axis."""
+    points, truth = case.load()
+    kept = {about: ASKED[about].weights for about in weights}
+    try:
+        for about, others in weights.items():
+            ASKED[about].weights = others
+        return asdict(compare(default()(points), truth))
+    finally:
+        for about, own in kept.items():
+            ASKED[about].weights = own
+
+
+def table(rows: list[dict]) -> Table:
+    """By family: shares with weights fitted to all families, with those fitted to the others, and the difference."""
+    lines = []
+    for family in [*dict.fromkeys(row["family"] for row in rows), "all"]:
+        here = rows if family == "all" else pick(rows, family=family)
+        rows_of = (pick(here, weights=name) for name in (SEEN, UNSEEN))
+        seen, unseen = ({(row["shape"], row["variant"]): row for row in each} for each in rows_of)
+        cells = []
+        for name in MEASURES:
+            sides = [[float(side[cloud].get(name, False)) for cloud in seen] for side in (seen, unseen)]
+            change = mean_with_interval([shape for shape, _ in seen], [b - a for a, b in zip(*sides, strict=True)])
+            cells += [*(number(sum(side) / len(seen), 2) for side in sides), told(*change, 2, sign="+")]
+        lines.append([family, str(len(seen)), *cells])
+    header = [f"{name}{word}" for name in MEASURES for word in (", all", ", others", ": change")]
+    return "weights fitted to all families, and to the others", ["family", "clouds", *header], lines
+
+
+def rows_of(sources: list[Path] | None, own: bool, variant: str, shapes: str, jobs: int) -> list[dict]:
+    """The questions about every cloud, a row each; saved ones are not asked again."""
+    saved = [path for path in sources or () if path.is_file()]
+    rows = [row for path in saved for row in read(path)["rows"]]
+    if folders := [path for path in sources or () if path.is_dir()] or not saved:
+        found = cases(folders if sources else None, own, variant, shapes)
+        rows += run(questions, [(case.facts, (case, default())) for case in found], jobs)
+    for row in rows:
+        if "failure" in row:
+            typer.echo(f"{row['shape']} {row['variant']}: {row['failure']}", err=True)
+    return rows
+
+
+@app.command()
+def fit(
+    sources: Sources = None,
+    own: Own = False,
+    variant: Variants = EVERY,
+    shapes: Shapes = "",
+    jobs: Jobs = 2,
+    output: Output = None,
+) -> None:
+    """The weights with which the questions are answered best, as glsk_o3d/decisions.py has them."""
+    rows = rows_of(sources, own, variant, shapes, jobs)
+    save(output, rows)
+    for about, answered in by_question(rows).items():
+        lines = [f'    "{name}": {weight:.2f},' for name, weight in fitted(answered).items()]
+        typer.echo("\n".join([f"{about} = {{", *lines, "}"]))
+
+
+@app.command()
+def check(
+    sources: Sources = None,
+    own: Own = False,
+    variant: Variants = EVERY,
+    shapes: Shapes = "",
+    leave_family_out: Annotated[
+        bool,
+        typer.Option(
+            "--leave-family-out", help="Not the package's weights, but for each family those fitted to the others."
+        ),
+    ] = False,
+    learnt: Annotated[
+        Path | None,
+        typer.Option("--from", metavar="JSON", exists=True, dir_okay=False, help="Fitted to these, else to the same."),
+    ] = None,
+    page: Annotated[
+        Path | None,
+        typer.Option("--page", help="Put the tables into this page, a picture beside it.", callback=page_with("check")),
+    ] = None,
+    jobs: Jobs = 2,
+    output: Output = None,
+    markdown: Markdown = False,
+) -> None:
+    """Whether what has some probability is so as often."""
+    rows = rows_of(sources, own, variant, shapes, jobs)
+    save(output, rows)
+    found = by_question(rows)
+    if leave_family_out:
+        others = by_question(read(learnt)["rows"]) if learnt else found
+        told = {about: (without_family(it, others[about]), it) for about, it in found.items()}
+    else:
+        told = {about: (said(ASKED[about].weights, it), it) for about, it in found.items()}
+    shown = tables(told)
+    present(shown, markdown)
+    if page is not None:
+        fill(page, {"check": shown})
+        draw_reliability(told, page.parent / "images")
+
+
+@study(app, lambda rows: [table(rows)], "transfer")
+def transfer(
+    learnt: Saved,
+    folder: Annotated[Path, typer.Argument(metavar="DIR", exists=True, file_okay=False, help="Other shapes.")],
+    variant: Variants = "*",
+    shapes: Shapes = "",
+    jobs: Jobs = 2,
+) -> list[dict]:
+    """Right topologies with weights fitted to all families, and for each family with those fitted to the others."""
+    answered = by_question(read(learnt)["rows"])
+    found = cases(folder, False, variant, shapes)
+    seen = weights_of(answered)
+    unseen = {family: weights_of(answered, family) for family in {case.facts["family"] for case in found}}
+    work = [(dict(weights=SEEN, **case.facts), (case, seen)) for case in found]
+    work += [(dict(weights=UNSEEN, **case.facts), (case, unseen[case.facts["family"]])) for case in found]
+    return run(measure, work, jobs)

@@ -1,0 +1,110 @@
+"""Cylinder models of trees (QSM) that other people publish: those of TreeQSM, SimpleForest and aRchi."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import typer
+from scipy.io import loadmat
+
+from glsk_o3d.analysis.forestry import BREAST_HEIGHT
+from glsk_o3d.geometry.vectors import norm
+
+MATRIX_STRUCTS = ("OptQSM", "QSM")  # of TreeQSM's .mat, each with a struct called cylinder
+# published: the columns of TreeQSM's text, which has one name for each three of them (TreeQSM's manual)
+TEXT_COLUMNS = ("radius", "length", "start.x", "start.y", "start.z", "axis.x", "axis.y", "axis.z")
+TEXT_COLUMNS += ("parent", "extension", "branch", "BranchOrder", "PositionInBranch")
+
+
+STARTS, ENDS = ("startX", "startY", "startZ"), ("endX", "endY", "endZ")
+PROGRAMS = {
+    "TreeQSM": (("start.x", "start.y", "start.z"), ("axis.x", "axis.y", "axis.z"), "radius", "BranchOrder", 0),
+    "SimpleForest": (STARTS, ENDS, "radius", "branchOrder", 0),
+    "aRchi": (STARTS, ENDS, "radius_cyl", "branching_order", 1),
+}
+"""What the columns of a program are called: starts, ends or directions, radii, orders; and which order its stem has."""
+
+
+@dataclass(frozen=True)
+class CylinderModel:
+    """A tree as cylinders in metres: both ends (K, 3), radii (K,), and orders (K,), of which 0 is the stem."""
+
+    start: np.ndarray
+    end: np.ndarray
+    radius: np.ndarray
+    order: np.ndarray
+
+    @property
+    def length(self) -> np.ndarray:
+        """Of each cylinder."""
+        return norm(self.end - self.start)
+
+    @property
+    def volume(self) -> float:
+        """Of all cylinders; where two overlap it counts twice, as in the programs that make them."""
+        return float(np.pi * (self.radius**2 * self.length).sum())
+
+    @property
+    def height(self) -> float:
+        """Of the highest end above the lowest."""
+        return float(np.ptp([self.start[:, 2], self.end[:, 2]]))
+
+    @property
+    def stem_diameter(self) -> float:
+        """Of the cylinder of the stem 1.3 m above the lowest end; NaN where there is none."""
+        heights = np.array([self.start[:, 2], self.end[:, 2]])
+        level = heights.min() + BREAST_HEIGHT
+        there = (self.order == 0) & (heights.min(axis=0) <= level) & (level <= heights.max(axis=0))
+        return float(2 * self.radius[there].mean()) if there.any() else float("nan")
+
+
+def read_cylinder_model(path: Path) -> CylinderModel:
+    """The cylinders of a ``.mat`` of TreeQSM, or of text with the columns of one of `PROGRAMS`.
+
+    A ``.mat`` has the struct ``cylinder``, by itself or in `MATRIX_STRUCTS`; of several models the first counts.
+    """
+    columns = _of_matrix(path) if path.suffix == ".mat" else _of_text(path)
+    for starts, ends, radius, order, stem in PROGRAMS.values():
+        if {*starts, *ends, radius, order, "length"} <= columns.keys():
+            start, end = (np.stack([columns[name] for name in names], axis=1) for names in (starts, ends))
+            end = end if ends == ENDS else start + end * columns["length"][:, None]
+            return CylinderModel(start, end, columns[radius], columns[order].astype(int) - stem)
+    raise typer.BadParameter(f"{path}: no columns of {', '.join(PROGRAMS)}; there are {', '.join(columns)}")
+
+
+def _of_text(path: Path) -> Mapping[str, np.ndarray]:
+    """Columns by their names; commas, semicolons, tabs or spaces are between them."""
+    first, *rest = path.read_text(encoding="utf-8-sig").replace('"', "").splitlines() or [""]
+    between = next((mark for mark in (",", ";", "\t") if mark in first), None)
+    try:
+        rows = np.genfromtxt(rest, delimiter=between, ndmin=2) if any(map(str.strip, rest)) else np.empty((0, 0))
+    except ValueError:
+        raise typer.BadParameter(f"{path}: no table: its lines have different numbers of columns") from None
+    names = [name.strip() for name in first.split(between)]
+    if rows.shape[1] == len(names) + 1:  # R writes the numbers of rows, and no name above them
+        rows = rows[:, 1:]
+    if names[0].startswith("radius") and "start_point" in names and rows.shape[1] >= len(TEXT_COLUMNS):
+        names, rows = list(TEXT_COLUMNS), rows[:, : len(TEXT_COLUMNS)]
+    if rows.shape[1] != len(names):
+        raise typer.BadParameter(f"{path}: {len(names)} names stand above {rows.shape[1]} columns of numbers")
+    return dict(zip(names, rows.T, strict=True))
+
+
+def _of_matrix(path: Path) -> Mapping[str, np.ndarray]:
+    """Fields of the struct ``cylinder``; one of three columns becomes ``name.x``, ``name.y`` and ``name.z``."""
+    found = loadmat(path, squeeze_me=True, struct_as_record=False)
+    holder = next((np.atleast_1d(found[name])[0] for name in MATRIX_STRUCTS if name in found), None)
+    cylinder = found.get("cylinder") if holder is None else holder.cylinder
+    if cylinder is None:
+        raise typer.BadParameter(f"{path}: has no struct called cylinder, {' or '.join(MATRIX_STRUCTS)}")
+    columns: dict[str, np.ndarray] = {}
+    for name in cylinder._fieldnames:
+        field = np.atleast_1d(getattr(cylinder, name)).astype(float)
+        if field.ndim == 2 and field.shape[1] == 3:
+            columns |= {f"{name}.{axis}": column for axis, column in zip("xyz", field.T, strict=True)}
+        elif field.ndim == 1:
+            columns[name] = field
+    return columns

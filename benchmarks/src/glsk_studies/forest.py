@@ -1,0 +1,431 @@
+"""Trees: clouds of them, the tools that are run on them, and what is measured."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from statistics import fmean
+
+import numpy as np
+import typer
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
+from scipy.spatial import cKDTree
+from scipy.stats import qmc
+
+from glsk_o3d import Skeleton, pipelines, read_cloud, samples
+from glsk_o3d.analysis import cylinders, tree_measures
+from glsk_o3d.analysis.curves import distances
+from glsk_o3d.analysis.forestry import BREAST_HEIGHT
+from glsk_o3d.geometry.vectors import dot, norm, unit
+from glsk_o3d.recipes.catalogue import named_pipeline
+from glsk_o3d.samples.capsules import visible
+
+from .cylinder_models import read_cylinder_model
+from .peers import PEERS, Graph, Peer, ours, separators_of_points, skeleton_of
+from .stopwatch import MB, peak, reset_peak, resident
+from .tables import Tables, cells_of, good, grouped, number, pick, short
+
+CONDITIONS = ("clean", "noise", "missing", "uneven")
+SPARSE = dict(n=4096, forks=6)  # tips are 0.4 spacings thick
+SOLID = dict(n=16384, forks=4)  # twigs are 3 spacings thick
+GAPS = 12  # of a cloud with missing data
+CAMERAS = np.array([[20.0, 2.0, 1.7], [-11.0, 17.0, 1.7], [-9.0, -18.0, 1.7]])  # a scanner's three places around a tree
+NEIGHBOURS = (6, 10, 20, 30)  # with which PyGEL3D is tried, since its result hangs on them
+HEIGHT = 10.0  # in metres, to which trees are scaled for PyTLidar, whose parameters are in metres
+STEP = 0.002  # between the places at which curves are measured, as a share of the diagonal
+CLOSE = 0.01  # places nearer to the other curve are right, as a share of the diagonal
+CURVE_MEASURES = ("f1", "precision", "recall", "accuracy", "completeness", "tips", "components", "loops", "cpu")
+TREE_MEASURES = ("volume", "stem_diameter", "height", "radius")
+NOISE = 0.001  # share of the diagonal, 7 mm
+PIPELINES = {"default, untraced": ("default", {"Tracer.surface": 0}), "default": ("default", {}), "tree": ("tree", {})}
+
+
+@dataclass(frozen=True)
+class SparseTree:
+    """A cloud in some condition and its axis, z up: of a file ``NAME.npz``, or the built-in tree of a seed."""
+
+    name: str
+    condition: str
+    path: Path | None = None
+    up: str = "z"
+
+    @property
+    def facts(self) -> dict[str, str]:
+        """What a row says of it."""
+        return dict(condition=self.condition, tree=self.name)
+
+    def load(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Points (n, 3), nodes (M, 3) and edges (E, 2)."""
+        if self.path is None:
+            return builtin(int(self.name), self.condition)
+        turn = upright(self.up)
+        with np.load(self.path) as archive:
+            return archive[self.condition][:, turn].astype(float), archive["nodes"][:, turn], archive["edges"]
+
+
+def upright(up: str) -> np.ndarray:
+    """The axes x, y and z, turned round so that the one that points up is the last: (3,) int array."""
+    if up not in ("x", "y", "z"):
+        raise typer.BadParameter(f"--up {up}: there are x, y and z")
+    return np.roll(np.arange(3), 2 - "xyz".index(up))
+
+
+def sparse_trees(folder: Path | None, up: str, trees: int) -> list[SparseTree]:
+    """The trees of a folder in all their conditions, or so many built-in ones."""
+    upright(up)
+    if folder is None:
+        return [SparseTree(str(seed), condition) for condition in CONDITIONS for seed in range(trees)]
+    found = []
+    for path in sorted(folder.glob("*.npz")):
+        with np.load(path) as archive:
+            found += [SparseTree(path.stem, it, path, up) for it in CONDITIONS if it in archive.files]
+    return sorted(found, key=lambda tree: CONDITIONS.index(tree.condition))
+
+
+def builtin(seed: int, condition: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A tree of `samples.tree` whose twigs are thinner than its points are apart, damaged by seeded code."""
+    drawn = samples.tree(seed=seed, noise=0.004 if condition == "noise" else 0.0, **SPARSE)
+    points, rng = drawn.points, np.random.default_rng(seed)
+    if condition == "noise":  # half of the points, 0.4 % of the diagonal
+        points = points[::2]
+    elif condition == "missing":  # half of the points, and gaps
+        centres = points[rng.choice(len(points), GAPS, replace=False)]
+        points = points[(np.linalg.norm(points[:, None] - centres, axis=2) > 0.12).all(axis=1)][::2]
+    elif condition == "uneven":  # a tenth as dense at the top as at the foot
+        height = points[:, 2] / points[:, 2].max()
+        points = points[rng.random(len(points)) < 10.0**-height]
+    return points, drawn.nodes, drawn.edges
+
+
+def solid(seed: int, condition: str) -> samples.Sample:
+    """A tree with a surface everywhere: whole, or as a lidar saw it from three places, with 5 mm of noise."""
+    if condition == "clean":
+        return samples.tree(seed=seed, **SOLID)
+    seen = samples.tree(seed=seed, cameras=CAMERAS, **SOLID)
+    noise = np.random.default_rng(seed).normal(scale=0.005, size=seen.points.shape)
+    return samples.Sample(seen.points + noise, seen.nodes, seen.edges, seen.radii, seen.name)
+
+
+@dataclass(frozen=True)
+class Scan:
+    """A tree with a surface as a lidar saw it, in metres."""
+
+    points: np.ndarray
+    tree: samples.Sample
+    scanners: int
+    noise: float
+    density: float
+
+    @property
+    def stem_diameter(self) -> float:
+        """1.3 m above the ground, which is z = 0."""
+        return float(np.interp(BREAST_HEIGHT, self.tree.nodes[:7, 2], 2 * self.tree.radii[:7]))
+
+    @property
+    def volume(self) -> float:
+        """Above the ground."""
+        return volume(self.tree) - 2 / 3 * np.pi * float(self.tree.radii[0]) ** 3
+
+
+def scan(seed: int) -> Scan:
+    """A tree of 8 to 15 m and 15 to 50 cm, drawn at random, and what one to three scanners 8 to 20 m away see of it.
+
+    A point is as probable as the surface faces the scanner. Its range has 2 to 5 mm of noise and its ray that of a beam
+    3 mm wide that widens by 0.3 mrad. Of grazing ones a tenth fly up to 20 cm behind the edge, and a hundred points of
+    undergrowth are around the foot.
+    """
+    rng = np.random.default_rng([seed, 7])
+    height, radius, density = rng.uniform(8, 15), rng.uniform(0.08, 0.26), rng.uniform(1000, 4000)
+    shape = dict(forks=3, length=height / 2.45, radius=radius, seed=seed)
+    outline = samples.tree(1, **shape)
+    ends, radii = outline.nodes[outline.edges], outline.radii[outline.edges]
+    area = np.pi * (radii.sum(axis=1) * norm(ends[:, 1] - ends[:, 0])).sum()
+    tree = samples.tree(round(density * area), **shape)
+    axes = tree.nodes, tree.edges, tree.radii
+    at = samples.signed_distance(tree.points, *axes)
+    normals = np.stack([samples.signed_distance(tree.points + 1e-5 * way, *axes) - at for way in np.eye(3)], axis=1)
+    normals = unit(normals)
+    scanners, noise = int(rng.integers(1, 4)), rng.uniform(0.002, 0.005)
+    around = rng.uniform(0, 2 * np.pi) + 2 * np.pi * np.arange(scanners) / scanners + rng.uniform(-0.5, 0.5, scanners)
+    far = rng.uniform(8, 20, scanners)
+    found = [np.column_stack([rng.uniform(-1, 1, (100, 2)), rng.uniform(0, 2, 100)])]
+    for place in np.column_stack([far * np.cos(around), far * np.sin(around), np.full(scanners, 1.7)]):
+        faces = -dot(unit(tree.points - place), normals)
+        seen = np.flatnonzero((rng.random(len(faces)) < faces) & (tree.points[:, 2] > 0))
+        seen = seen[visible(tree.points[seen], place, *axes)]
+        away = norm(tree.points[seen] - place)
+        beam = (0.003 + 0.0003 * away) / 4  # four standard deviations are its width
+        rays = tree.points[seen] - place + beam[:, None] * rng.normal(size=(len(seen), 3))
+        fly = (faces[seen] < 0.15) & (rng.random(len(seen)) < 0.1)
+        ranges = away + noise * rng.normal(size=len(seen)) + fly * rng.uniform(0, 0.2, len(seen))
+        found.append(place + ranges[:, None] * unit(rays))
+    return Scan(np.concatenate(found), tree, scanners, noise, density)
+
+
+def volume(tree: samples.Sample, n: int = 4_000_000) -> float:
+    """Of the union of its tapered capsules: of each the part that is inside no earlier one, by points in its box.
+
+    Points of a Halton sequence: a million random ones were 0.2 % too high, the same way for all trees.
+    """
+    total = 0.0
+    low = (tree.nodes - tree.radii[:, None])[tree.edges].min(axis=1)
+    high = (tree.nodes + tree.radii[:, None])[tree.edges].max(axis=1)
+    boxes = (high - low).prod(axis=1)
+    counts = np.maximum(np.round(n * boxes / boxes.sum()).astype(int), 1000)
+    spread = qmc.Halton(3, seed=0).random(counts.max())
+    for i, box in enumerate(boxes):
+        points = low[i] + (high[i] - low[i]) * spread[: counts[i]]
+        earlier = np.flatnonzero(((low[:i] < high[i]) & (high[:i] > low[i])).all(axis=1))
+        total += box * (_inside(tree, [i], points) & ~_inside(tree, earlier, points)).mean()
+    return total
+
+
+def _inside(tree, rows, points):
+    """Which points are inside one of these capsules."""
+    nodes, edges = np.unique(tree.edges[rows], return_inverse=True)
+    return samples.signed_distance(points, tree.nodes[nodes], edges.reshape(-1, 2), tree.radii[nodes]) < 0
+
+
+def level_sets(points: np.ndarray, k: int = 10) -> Graph:
+    """Points in bands of equal geodesic distance from the lowest one; each connected piece of a band is a vertex."""
+    n, (distance, neighbour) = len(points), cKDTree(points).query(points, k + 1)
+    near = coo_matrix((distance[:, 1:].ravel(), (np.repeat(np.arange(n), k), neighbour[:, 1:].ravel())), (n, n)).tocsr()
+    graph = near.maximum(near.T)
+    while (pieces := connected_components(graph)[1]).any():  # join what is apart where it is nearest, piece by piece
+        apart = pieces != pieces[0]
+        gap, other = cKDTree(points[apart]).query(points[~apart])
+        link = np.flatnonzero(~apart)[gap.argmin()], np.flatnonzero(apart)[other[gap.argmin()]]
+        graph = graph.maximum(coo_matrix((np.full(2, gap.min()), (link, link[::-1])), (n, n)).tocsr())
+    from_root = dijkstra(graph, indices=points[:, 2].argmin())
+    band = (from_root / (1.5 * np.median(distance[:, 1:4]))).astype(int)
+    a, b = graph.nonzero()
+    same = band[a] == band[b]
+    count, vertex = connected_components(coo_matrix((np.ones(same.sum()), (a[same], b[same])), (n, n)))
+    places = np.stack([np.bincount(vertex, axis) for axis in points.T], axis=1) / np.bincount(vertex)[:, None]
+    ends = np.unique(np.stack([vertex[a[~same]], vertex[b[~same]]], axis=1), axis=0)
+    lengths = np.linalg.norm(np.diff(places[ends], axis=1)[:, 0], axis=1)
+    tree = minimum_spanning_tree(coo_matrix((lengths + 1e-12, ends.T), (count, count)))
+    return places, np.column_stack(tree.nonzero())
+
+
+def pytlidar(points: np.ndarray) -> Graph:
+    """PyTLidar's TreeQSM with the inputs that it estimates; the axes of its cylinders, each joined to its parent."""
+    from PyTLidar.treeqsm import treeqsm
+    from PyTLidar.Utils.define_input import define_input
+
+    scale, foot = HEIGHT / np.ptp(points[:, 2]), points.min(axis=0)
+    cloud = (points - foot) * scale
+    silent = dict.fromkeys(("plot", "savetxt", "savemat", "savepdf", "disp"), 0)
+    models, _ = treeqsm(cloud, define_input(cloud, 1, 1, 1)[0] | silent)
+    found = models[0]["cylinder"]
+    n, parent = len(found["start"]), np.asarray(found["parent"], int)
+    start = np.asarray(found["start"], float)
+    end = start + np.asarray(found["axis"], float) * np.asarray(found["length"], float)[:, None]
+    child = np.flatnonzero(parent >= 0)
+    further = np.linalg.norm(end[parent[child]] - start[child], axis=1)
+    nearer_end = np.where(further < np.linalg.norm(start[parent[child]] - start[child], axis=1), n, 0) + parent[child]
+    cylinders = np.column_stack([np.arange(n), n + np.arange(n)])
+    return np.concatenate([start, end]) / scale + foot, np.concatenate(
+        [cylinders, np.stack([nearer_end, child], axis=1)]
+    )
+
+
+TOOLS: dict[str, Peer] = {
+    "tree": Peer("`tree`", (), "points", partial(ours, "tree")),
+    "default": PEERS["default"],
+    "untraced": Peer(
+        "`default`, `Tracer.surface=0`", (), "points", partial(ours, "default", options={"Tracer.surface": 0})
+    ),
+    "cao2010": PEERS["cao2010"],
+    "levels": Peer("geodesic level sets", (), "points", level_sets),
+    "pytlidar": Peer("PyTLidar, TreeQSM", ("PyTLidar",), "points", pytlidar),
+    **{
+        f"pygel-{k}": Peer(
+            f"PyGEL3D, {k} neighbours", ("PyGEL3D",), "points", partial(separators_of_points, neighbours=k)
+        )
+        for k in NEIGHBOURS
+    },
+    "pc-skeletor": PEERS["pc-skeletor"],
+    "cgal": PEERS["cgal"],
+}
+"""By name; each is given points with z up."""
+
+
+def score(points: np.ndarray, axis: Skeleton, found: Skeleton) -> dict[str, float]:
+    """Shares of both curves that are close to the other, mean distances in percent of the diagonal, and topology."""
+    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    there, back = (distances(*pair, STEP * diagonal)[0] / diagonal for pair in ((found, axis), (axis, found)))
+    precision, recall = (float((way < CLOSE).mean()) for way in (there, back))
+    return dict(
+        f1=2 * precision * recall / max(precision + recall, 1e-9),
+        precision=precision,
+        recall=recall,
+        accuracy=100 * float(there.mean()),
+        completeness=100 * float(back.mean()),
+        tips=len(found.leaves) / len(axis.leaves),
+        components=found.n_components,
+        loops=found.n_loops,
+    )
+
+
+def measure_curve(tree: SparseTree, tool: Peer) -> dict:
+    """One skeleton against its axis."""
+    points, nodes, edges = tree.load()
+    found, cpu = tool.timed(points)
+    return dict(cpu=cpu, points=len(points)) | score(points, skeleton_of(nodes, edges), found)
+
+
+def curve_tables(rows: list[dict]) -> Tables:
+    """F1 in every condition at a glance, and then a table for each condition."""
+    by_condition, by_tool, lines = grouped(rows, "condition"), grouped(rows, "tool"), []
+    for tool, here in by_tool.items():
+        means = [mean(pick(here, condition=it)) for it in by_condition]
+        whole = sum(row.get("components") == 1 and row.get("loops") == 0 for row in here)
+        clean = [number(means[0][key], 2) for key in ("accuracy", "completeness", "tips", "cpu")]
+        cells = [*(number(it["f1"], 2) for it in means), f"{whole}/{len(here)}", *clean]
+        lines.append([TOOLS[tool].label, *cells, failed(here)])
+    header = ["", *by_condition, "one tree", "accuracy %", "completeness %", "tips", "CPU s", "failed"]
+    first, trees = next(iter(by_condition)), len(grouped(rows, "tree"))
+    tables = [(f"F1 of {trees} sparse trees, and more of the {first} ones", header, lines)]
+    header = ["", "f1", "precision", "recall", "accuracy %", "completeness %", "components", "loops", "tips", "failed"]
+    digits = dict(f1=2, precision=2, recall=2, accuracy=2, completeness=2, components=1, loops=1, tips=2)
+    for condition, those in by_condition.items():
+        lines = []
+        for tool, here in grouped(those, "tool").items():
+            it = mean(here)
+            lines.append([TOOLS[tool].label, *(number(it[key], n) for key, n in digits.items()), failed(here)])
+        tables.append((condition, header, lines))
+    return tables
+
+
+def mean(rows: list[dict]) -> dict[str, float]:
+    """Over the trees that gave a skeleton."""
+    known = good(rows)
+    return {key: fmean(row[key] for row in known) if known else float("nan") for key in CURVE_MEASURES}
+
+
+def failed(rows: list[dict]) -> str:
+    """Which failed, and how."""
+    return ", ".join(f"{row['tree']} {row['condition']} ({row['failure']})" for row in rows if "failure" in row)
+
+
+def measure_tree(seed: int, condition: str) -> dict[str, float]:
+    """Errors of one tree, as shares of what is true."""
+    drawn = solid(seed, condition)
+    skeleton = pipelines.tree()(drawn.points)
+    found = tree_measures(skeleton)
+    stem = np.interp(BREAST_HEIGHT + drawn.points[:, 2].min(), drawn.nodes[:7, 2], 2 * drawn.radii[:7])
+    nearest = cKDTree(drawn.nodes).query(skeleton.vertices)[1]
+    true = dict(
+        volume=(cylinders(skeleton).volume.sum(), volume(drawn)),
+        stem_diameter=(found.stem_diameter, stem),
+        height=(found.height, (drawn.nodes[:, 2] + drawn.radii).max() - (drawn.nodes[:, 2] - drawn.radii).min()),
+        radius=(np.median(skeleton.radii / drawn.radii[nearest]), 1.0),
+    )
+    return {name: float(mine / known - 1) for name, (mine, known) in true.items()}
+
+
+def measure_stem(seed: int) -> dict[str, float]:
+    """Diameter and volume of a scanned tree, as found and as they are."""
+    scanned = scan(seed)
+    found = tree_measures(pipelines.tree()(scanned.points))
+    said = dict(stem_diameter=found.stem_diameter, stem_arc=found.stem_arc, volume=sum(found.volume))
+    true = dict(true_diameter=scanned.stem_diameter, true_volume=scanned.volume)
+    more = dict(height=found.height, noise=scanned.noise, doubts=len(found.doubts))
+    return said | true | more | dict(scanners=scanned.scanners, density=scanned.density)
+
+
+def measure_model(cloud: Path, model: Path, unit: float) -> dict:
+    """What we and a cylinder model say of a scanned tree."""
+    found, theirs = tree_measures(pipelines.tree()(read_cloud(cloud)), unit=unit), read_cylinder_model(model)
+    mine = dict(height=found.height, stem_diameter=found.stem_diameter, volume=float(sum(found.volume)))
+    said = {name: (value, getattr(theirs, name)) for name, value in mine.items()}
+    return said | dict(doubts=found.doubts)
+
+
+def model_tables(rows: list[dict]) -> Tables:
+    """A line for each tree: ours and theirs."""
+
+    def cells(row):
+        return [f"{it:.3g}" for name in ("height", "stem_diameter", "volume") for it in row[name]]
+
+    lines = cells_of(rows, ["tree"], cells, 6)
+    for line, row in zip(lines, rows, strict=True):
+        line[-1] = line[-1] or "; ".join(row["doubts"])
+    header = ["", "height m", "theirs", "stem m", "theirs", "volume m3", "theirs", "doubts"]
+    return [("Scanned trees, and cylinder models of them", header, lines)]
+
+
+def stem_tables(rows: list[dict]) -> Tables:
+    """Good diameters and volumes by seeds and scanners; and a line for each tree."""
+    lines = []
+    for seeds, here in grouped(rows, "seeds").items():
+        sets = [(f"{seeds} seeds, {n} scanner{'s' * (n > 1)}", pick(good(here), scanners=n)) for n in (1, 2, 3)]
+        for label, some in (*sets, (f"{seeds} seeds, all", good(here))):
+            if some:
+                lines.append([label, *_stem_cells(some)])
+
+    def cells(row):
+        stem = [f"{100 * row[it]:.2f}" for it in ("true_diameter", "stem_diameter")]
+        wood = [f"{row[it]:.3f}" for it in ("true_volume", "volume")]
+        return [str(row["scanners"]), *stem, f"{row['stem_arc']:.0f}", *wood]
+
+    header = ["", "trees", "within 3 %", "median error %", "volume: median error %"]
+    heads = ["seeds", "tree", "scanners", "true cm", "found cm", "arc", "true m3", "found m3", "note"]
+    return [
+        ("Stem diameters at 1.3 m, and volumes, of scanned trees", header, lines),
+        ("Each tree", heads, cells_of(rows, ["seeds", "tree"], cells, 6)),
+    ]
+
+
+def _stem_cells(rows):
+    """How good the diameters and volumes of some trees are."""
+    stem, wood = (
+        np.abs([row[said] / row[true] - 1 for row in rows])
+        for said, true in (("stem_diameter", "true_diameter"), ("volume", "true_volume"))
+    )
+    shares = [f"{(stem < 0.03).sum()}", f"{100 * np.nanmedian(stem):.2f}", f"{100 * np.median(wood):.1f}"]
+    return [str(len(rows)), *shares]
+
+
+def measure_tables(rows: list[dict]) -> Tables:
+    """The median error of each measure, its quartiles, and the worst."""
+    lines = []
+    for condition, here in grouped(rows, "condition").items():
+        known = good(here)
+        for name in TREE_MEASURES if known else ():
+            errors = 100 * np.array([row[name] for row in known])
+            low, middle, high = np.quantile(errors, [0.25, 0.5, 0.75])
+            size = np.abs(errors)
+            cells = [f"{np.median(size):.1f}", f"{middle:+.1f} ({low:+.1f} to {high:+.1f})", f"{size.max():.1f}"]
+            lines.append([f"{condition}: {name.replace('_', ' ')}", *cells, f"{len(here) - len(known)}"])
+    trees = len({row["tree"] for row in rows})
+    header = ["", "median size", "median (quartiles)", "largest", "failures"]
+    return [(f"Errors of {trees} trees, in percent", header, lines)]
+
+
+def once(path: Path, pipeline: str) -> dict:
+    """One run on a saved scan, to be made in a fresh process."""
+    points = np.load(path)
+    name, options = PIPELINES[pipeline]
+    chosen = named_pipeline(name).with_options(options)
+    reset_peak()
+    before, start = resident(), (time.process_time(), time.perf_counter())
+    skeleton = chosen(points)
+    facts = dict(cpu=time.process_time() - start[0], wall=time.perf_counter() - start[1], peak=(peak() - before) / MB)
+    counts = dict(components=skeleton.n_components, loops=skeleton.n_loops, tips=len(skeleton.leaves))
+    return facts | counts | dict(traced=skeleton.report.n_traced)
+
+
+def large_tables(rows: list[dict]) -> Tables:
+    """A line for each size and pipeline."""
+
+    def cells(row):
+        costs = [short(row[key]) for key in ("cpu", "wall", "peak")]
+        return [*costs, *(str(row[key]) for key in ("components", "loops", "tips", "traced"))]
+
+    header = ["", "points", "CPU s", "wall s", "MB", "components", "loops", "tips", "traced", "note"]
+    return [("Lidar scans of one tree", header, cells_of(rows, ["pipeline", "n"], cells, 7))]

@@ -1,0 +1,127 @@
+"""Skeletons per second: in a fresh process and after, and of the frames of a depth camera."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+import time
+import warnings
+from functools import partial
+from itertools import product
+from pathlib import Path
+from statistics import median
+from unittest.mock import patch
+
+import numpy as np
+from glsk_bench.scanning import depth_image, places_at
+from glsk_bench.shapes import shape
+
+from glsk_o3d import SkeletonWarning, skeletonize
+from glsk_o3d.apps.batch import Skeletonizer
+from glsk_o3d.data.skeleton import ARRAYS
+from glsk_o3d.geometry.cores import cores
+
+from .clouds import builtin
+from .runs import named, run
+from .stages import timed
+from .stopwatch import fresh_python, in_turns, yardstick
+from .tables import Tables, cells_of, number, short
+
+FRAMES, TURN = 30, 60.0  # of a camera, and the degrees that it turns by around the scene meanwhile
+CAMERA_HEIGHT = 20.0  # degrees
+COLD = """
+import json, sys, time
+start = time.perf_counter(), time.process_time()
+from glsk_o3d import skeletonize
+imported = time.perf_counter(), time.process_time()
+import numpy
+points = numpy.load(sys.argv[1])
+begun = time.perf_counter(), time.process_time()
+skeletonize(points, sys.argv[2])
+done = time.perf_counter(), time.process_time()
+spent = dict(import_wall=imported[0] - start[0], import_cpu=imported[1] - start[1])
+print(json.dumps(dict(spent, first_wall=done[0] - begun[0], first_cpu=done[1] - begun[1])))
+"""
+"""A fresh process: what the import and the first call take."""
+
+
+def first_and_next(path: Path, pipeline: str, repeat: int, threads: int) -> dict:
+    """Medians over fresh processes, and what runs take that follow each other in one."""
+    with patch.dict(os.environ, OMP_NUM_THREADS=str(threads)):  # the package asks at every call
+        found = []
+        for _ in range(repeat):
+            spent, wall = fresh_python(COLD, path, pipeline)
+            found.append(json.loads(spent) | dict(process_wall=wall))
+        cold = {name: median(each[name] for each in found) for name in found[0]}
+        return cold | timed(path, named(pipeline), repeat)[pipeline]
+
+
+def measure_rate(sizes: list[int], pipelines: list[str], shape: str, repeat: int, jobs: int) -> list[dict]:
+    """A row for each size and pipeline, in one thread and in one for each core."""
+    named(",".join(pipelines))
+    with tempfile.TemporaryDirectory() as folder:
+        work = []
+        for n in sizes:
+            path = Path(folder, f"{n}.npy")
+            np.save(path, builtin(shape, f"clean_{n}")[0])
+            facts = dict(measure="rate", n=n, shape=shape)
+            for name, threads in product(pipelines, sorted({1, cores()})):
+                work.append((facts | dict(pipeline=name, threads=threads), (path, name, repeat, threads)))
+        return run(first_and_next, work, min(jobs, 1))
+
+
+def rate_tables(rows: list[dict]) -> Tables:
+    """Cold and warm."""
+    header = ["", "points", "threads", "1 kNN ms", "import ms", "first call ms", "process ms"]
+    header += ["next call ms", "CPU ms", "per second", "first process per second", "note"]
+    keys = ("knn_wall", "import_wall", "first_wall", "process_wall", "wall", "cpu")
+
+    def cells(row):
+        return [*(short(1000 * row[key]) for key in keys), *(number(1 / row[it], 1) for it in ("wall", "process_wall"))]
+
+    return [("skeletons per second, wall time", header, cells_of(rows, ["pipeline", "n", "threads"], cells, 8))]
+
+
+def frames(family: str, seed: int, n: int) -> list[np.ndarray]:
+    """What a depth camera that turns around a random shape sees, n points a frame."""
+    scene, rng = shape(family, seed), np.random.default_rng(seed)
+    eyes = places_at(np.radians(np.linspace(0, TURN, FRAMES)), np.full(FRAMES, np.radians(CAMERA_HEIGHT)))
+    return [depth_image(scene, eye, n, rng) for eye in eyes]
+
+
+def measure_stream(sizes: list[int], families: list[str], repeat: int) -> list[dict]:
+    """A row for each size, family and number of workers: frames per second, once all processes have begun."""
+    warnings.simplefilter("ignore", SkeletonWarning)
+    rows = []
+    for n, family in product(sizes, families):
+        seen = frames(family, 0, n)
+        knn = in_turns({"1 kNN": partial(yardstick, seen[0])}, repeat)["1 kNN"][1]["wall"]
+        expected = [skeletonize(frame) for frame in seen]
+        for workers in sorted({1, cores()}):
+            spent = []
+            with Skeletonizer(workers=workers) as skeletonizer:
+                list(skeletonizer.stream(seen[: 2 * workers]))
+                for _ in range(repeat):
+                    start = time.perf_counter()
+                    found = list(skeletonizer.stream(seen))
+                    spent.append((time.perf_counter() - start) / FRAMES)
+            same = all(
+                np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True)
+                for one, other in zip(found, expected, strict=True)
+                for name in ARRAYS
+            )
+            facts = dict(measure="stream", n=n, shape=family, workers=workers, same=same)
+            rows.append(facts | dict(knn_wall=knn, wall=median(spent), least=min(spent), most=max(spent)))
+    return rows
+
+
+def stream_tables(rows: list[dict]) -> Tables:
+    """Frames per second of streams."""
+    header = ["scene", "points", "workers", "1 kNN ms", "a frame ms", "frames per second", "least", "most", "same bits"]
+    lines = []
+    for row in rows:
+        rates = [number(1 / row[key], 1) for key in ("wall", "most", "least")]
+        times = (short(1000 * row[key]) for key in ("knn_wall", "wall"))
+        lines.append([row["shape"], str(row["n"]), str(row["workers"]), *times, *rates, "yes" if row["same"] else "no"])
+    return [(f"streams of {FRAMES} depth frames, wall time", header, lines)]
