@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glsk_o3d import Connector, Contractor, Report, pipelines, skeletonize
+from glsk_o3d import Connector, Contractor, Report, Skeleton, pipelines, skeletonize
 from glsk_o3d.curve.curve import Curve
 from glsk_o3d.curve.merging import collapse_triangles, drop_edges, drop_vertices
 from glsk_o3d.curve.surface import Evidence, Surface
@@ -141,6 +141,8 @@ def test_two_strands_in_one_tube_become_a_path(piped, refine, gap, side):
     skeleton = refine(raw, handle=0.5)
     assert (raw.n_loops, counts(skeleton), len(skeleton.junctions)) == (1, (1, 0, 2), 0)
     assert np.abs(skeleton.vertices[:, 1]).max() < 0.4 * gap
+    assert len(skeleton.vertices) > 0.8 * 2 / 0.05  # every vertex met the one across
+    assert skeleton.edge_lengths.max() < 1.6 * 0.05 + gap
     assert skeleton.report.n_loops_closed == 1
     assert refine(raw).n_loops == 1
 
@@ -374,6 +376,40 @@ def test_hand_made_cases_are_judged_as_they_were_when_the_models_were_fitted(pip
     found = sorted(question().candidates(oriented(make(piped)), 0.5), key=lambda each: each.place.round(2).tolist())
     probability = np.array([each.probability for each in found])
     np.testing.assert_allclose(np.log(probability / (1 - probability)), recorded, atol=0.02)
+
+
+@pytest.mark.parametrize("question", [Loops, Limbs, FalseBranches, Gaps])
+@pytest.mark.parametrize("lines", [ACROSS, LADDER, FORK, PARTS], ids=["strut", "ladder", "fork", "parts"])
+def test_the_numbers_of_vertices_and_points_do_not_matter(piped, placed, question, lines):
+    """Nor does how the object is turned."""
+    raw, rng = surely(piped(lines)), np.random.default_rng(0)
+    new, order = rng.permutation(len(raw.vertices)), rng.permutation(len(raw.points))
+    old = np.argsort(new)
+    other = Skeleton(
+        *(raw.vertices[old], new[raw.edges], raw.radii[old], new[raw.vertex_of_point[order]]),
+        *(raw.points[order], raw.normals[order], raw.report, raw.confidence[old]),
+    )
+    one, other = (
+        sorted(each.probability for each in question().candidates(oriented(skeleton), 0.5))
+        for skeleton in (raw, placed(other)[0])
+    )
+    np.testing.assert_allclose(one, other, rtol=1e-3)
+
+
+@pytest.mark.parametrize(("step", "every"), [(0.5, 3), (0.0125, 2), (0.004, 1)])
+def test_the_surface_has_4096_points_and_32_for_every_vertex_of_more(piped, step, every):
+    curve = Curve.of(piped(TUBE, step=step, spacing=0.01))
+    assert len(curve.points) == 12566
+    assert len(Surface.of(curve).points) == np.ceil(12566 / every)
+
+
+@pytest.mark.parametrize("tilt", [0, 30, 90])
+def test_the_area_along_a_curve_is_that_of_its_tube_as_far_as_the_normals_stand_upright(piped, tilt):
+    tube, angle = piped(TUBE, spacing=0.01), np.radians(tilt)
+    area = oriented(tube).area
+    assert area.sum() == pytest.approx(2 * np.pi * 0.1 * 2, rel=0.06)  # its ends are open
+    leaning = replace(tube, normals=np.cos(angle) * tube.normals + np.sin(angle) * X)
+    np.testing.assert_allclose(oriented(leaning).area, area * np.cos(angle) ** 2, atol=1e-9)
 
 
 class RightEnds(Question):
