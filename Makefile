@@ -38,7 +38,7 @@ docs: $(VENV)/.installed-docs ## build the site into build/docs/index.html (SPHI
 
 figures: $(VENV)/.installed-test ## draw the pictures of the README and of the pages anew, into docs/images
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python docs/_ext/figures.py docs/images
-	$(BIN)/python benchmarks/leaderboard.py page README.md docs/comparison.md
+	$(BIN)/python benchmarks/leaderboard.py page README.md docs/comparison.md docs/comparison_tables.md
 
 accuracy: $(VENV)/.installed-demo ## how far skeletons are from known axes (ACCURACY_ARGS="ablation --builtin" for more)
 	$(BIN)/python benchmarks/accuracy.py $(ACCURACY_ARGS)

@@ -35,11 +35,9 @@ settings.register_profile("suite", deadline=None, derandomize=True, suppress_hea
 settings.load_profile("suite")
 
 SLOW = """
-analysis/test_assessment analysis/test_curvature analysis/test_forestry analysis/test_grasp batch benchmark cli
-crosscheck interop io/formats io/test_colors io/test_skeletons io/test_streaming io/test_tubes
-meshlab recipes ros2 samples test_architecture test_benchmarks test_calibrate test_constants test_digest
-test_equations test_examples test_external test_filter_scripts test_fuzz test_gallery test_grasps test_leaderboard
-test_site test_speed test_tiles test_trees test_typing viewing
+analysis/test_assessment analysis/test_grasp apps benchmark cli interop io/formats io/test_skeletons io/test_streaming
+recipes ros2 samples test_architecture test_benchmarks test_calibrate test_constants test_digest test_examples
+test_external test_filter_scripts test_fuzz test_leaderboard test_speed test_trees viewing
 """.split()  # noqa: SIM905
 """Folders and modules, by how their paths in `tests` begin, that are slow as a whole; single tests have the marker."""
 

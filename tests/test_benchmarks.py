@@ -97,7 +97,7 @@ class TestArithmetic:
         assert line[7:9] == ["0.200 → 0.190", "-0.010 [-0.010, -0.010]"]  # of the pairs that both have one
 
     def test_the_paper_has_what_ideas_are_worth(self, root):
-        page = (root / "docs" / "paper.md").read_text(encoding="utf-8")
+        page = (root / "docs" / "differences.md").read_text(encoding="utf-8")
         assert f"<!-- worth -->\n\n{accuracy.worth_text()}" in page
 
 

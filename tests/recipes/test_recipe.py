@@ -226,7 +226,7 @@ def test_a_class_of_another_module_is_named_with_it():
 
 
 def test_the_documentation(root):
-    (block,) = re.findall(r"```json\n(.*?)```", (root / "docs" / "recipes.md").read_text(), re.DOTALL)
+    (block,) = re.findall(r"```json\n(.*?)```", (root / "docs" / "plugins.md").read_text(), re.DOTALL)
     assert from_recipe(json.loads(block)).stages[2].reducer == LPRReducer(phi=2e5)
 
 

@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 
 from glsk_o3d import Skeleton, read_skeleton, samples
 from glsk_o3d.analysis.curves import along, pieces
-from glsk_o3d.apps.batch.grid import Grid
+from glsk_o3d.apps.batch.tiles import Grid
 
 from .batch import glsk_batch, kill_one, ledger, write_ply
 from .runs import Markdown, Output, writable
