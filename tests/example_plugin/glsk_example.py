@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
@@ -14,11 +13,8 @@ from glsk_o3d.parameters import Parameters, documented, parameter, resolve_lengt
 
 @documented
 @dataclass(frozen=True, kw_only=True)
-class Voxel(Filter):
+class Voxel(Filter[Cloud, Cloud]):
     """Replace the points in every cell of a grid by their mean."""
-
-    consumes: ClassVar[type] = Cloud
-    produces: ClassVar[type] = Cloud
 
     size: float | str = parameter(
         "2%", "Side of a cell.", type="length", unit="cloud's units, or % of the diagonal", low=0, open_low=True
@@ -35,11 +31,8 @@ class Voxel(Filter):
 
 @documented
 @dataclass(frozen=True, kw_only=True)
-class RadiusFloor(Filter):
+class RadiusFloor(Filter[Skeleton, Skeleton]):
     """Let no radius be less than a share of the median radius."""
-
-    consumes: ClassVar[type] = Skeleton
-    produces: ClassVar[type] = Skeleton
 
     share: float = parameter(0.5, "Least radius over the median radius.", type="float", low=0)
 

@@ -4,7 +4,7 @@ import numpy as np
 import open3d as o3d
 import pytest
 
-from glsk_o3d.data.points import ENOUGH, default_k
+from glsk_o3d.data.points import POINTS, default_k
 from glsk_o3d.geometry.area_sampling import sample_by_area, vertices_mislead
 
 SHAPES = o3d.geometry.TriangleMesh
@@ -15,7 +15,7 @@ def arrays(mesh):
 
 
 def mislead(mesh):
-    return vertices_mislead(arrays(mesh) if isinstance(mesh, SHAPES) else mesh, default_k, ENOUGH)
+    return vertices_mislead(arrays(mesh) if isinstance(mesh, SHAPES) else mesh, default_k, POINTS.enough)
 
 
 # ------------------------------------------------------------------------------------------------------------- samples
