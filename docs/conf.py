@@ -38,8 +38,10 @@ nitpicky = True
 nitpick_ignore = [
     ("py:class", "pymeshlab.pmeshlab.MeshSet"),
     ("py:class", "glsk_o3d.analysis.rows.Rows"),  # of the tables
-    ("py:class", "glsk_o3d.data.points.Representatives"),  # of Points and Contraction
-    ("py:obj", "glsk_o3d.pipeline.Produced"),  # a type variable
+    ("py:class", "glsk_o3d.data.points.WorkingCloud"),  # of Points and Contraction
+    ("py:class", "glsk_o3d.data.graph.Graph"),  # of Skeleton
+    ("py:obj", "glsk_o3d.pipeline.In"),  # type variables
+    ("py:obj", "glsk_o3d.pipeline.Out"),
 ]
 default_role = "autolink"
 
