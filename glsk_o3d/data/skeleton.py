@@ -244,7 +244,11 @@ def _check_values(skeleton: Skeleton) -> None:
     _check_range(skeleton, "edges", 0, m - 1, there)
     _refuse(skeleton, "edges", skeleton.edges[:, 0] == skeleton.edges[:, 1], "joins a vertex with itself")
     _check_range(skeleton, "vertex_of_point", -1, m - 1, there)
+    representative = skeleton.representative_of_point
     _check_range(skeleton, "representative_of_point", -1, len(owner) - 1, "names a missing point")
+    further = (representative >= 0) & (representative[representative] >= 0)
+    passed_on = further & (representative[representative] != representative)
+    _refuse(skeleton, "representative_of_point", passed_on, "names a point that another one represents")
     owned = f"{finite}, as vertex_of_point gives it a vertex"
     _check_range(skeleton, "points", -FARTHEST_PLACE, FARTHEST_PLACE, owned, lambda points: (owner < 0)[:, None])
     _check_range(skeleton, "normals", -UNIT, UNIT, "must be unit vectors, or NaN", unless=np.isnan)

@@ -131,6 +131,7 @@ LINE = dict(
         ("vertex_of_point", [0, -2, 3], r"vertex_of_point\[1\] = -2: names a missing vertex"),
         ("vertex_of_point", [0, 1, 1], r"points\[2\] = .*: must be finite, .* as vertex_of_point gives it a vertex"),
         ("representative_of_point", [0, 1, 3], r"representative_of_point\[2\] = 3: names a missing point"),
+        ("representative_of_point", [1, 2, 0], r"representative_of_point\[0\] = 1: names a point that another one"),
         ("representative_of_point", [0, 1], "representative_of_point: has 2 rows for 3 points"),
         ("normals", [[0, 0, np.inf]] * 3, r"normals\[0\] = .*: must be unit vectors, or NaN"),
         ("confidence", [0, 1.5, 0], r"confidence\[1\] = 1.5: must lie between 0 and 1, or be NaN"),

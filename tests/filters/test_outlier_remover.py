@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import binary_dilation
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from glsk_o3d import OutlierRemover, RingBuilder, Sampler, samples
+from glsk_o3d import OutlierRemover, RingBuilder, Sampler, samples, skeletonize
 from glsk_o3d.filters.outlier_remover import inliers
 from glsk_o3d.geometry.grid_sampling import sample_grid
 from glsk_o3d.geometry.neighbourhoods import mean_distances, nearest_neighbours
@@ -121,3 +122,26 @@ def test_twigs_and_noise_are_no_mixed_pixels():
     """Where little of a cloud is a surface, sparse points are parts of it."""
     for shape in (samples.tree(4096, forks=6, seed=1), samples.torus(4000, noise=0.03)):
         assert STRICT(shape.points).report.n_mixed == 0
+
+
+def star_from_above(seed, pitch=0.012, radius=0.03, arms=6):
+    """Half a ball with thin arms on a grid of pixels, and mixed pixels beside its outline, down to the ground."""
+    rng, steps = np.random.default_rng(seed), np.arange(-1, 1, pitch)
+    grid = np.stack(np.meshgrid(steps, steps), axis=-1)
+    squared = 0.2**2 - (grid**2).sum(axis=-1)
+    for angle in np.arange(arms) * 2 * np.pi / arms:
+        along, off = np.moveaxis(grid @ [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]], -1, 0)
+        squared = np.maximum(squared, np.where((along > 0) & (along < 0.9), radius**2 - off**2, -1))
+    hit = squared > 0
+    outline = np.argwhere(binary_dilation(hit) & ~hit)
+    mixed = grid[tuple(outline[rng.choice(len(outline), round(0.08 * hit.sum()), replace=False)].T)]
+    surface = np.column_stack([grid[hit], np.sqrt(squared[hit]) + rng.normal(0, 0.001, hit.sum())])
+    return np.concatenate([surface, np.column_stack([mixed, rng.uniform(-0.3, -0.02, len(mixed))])])
+
+
+@pytest.mark.filterwarnings("ignore:weakly supported")  # half of every arm is unseen
+@pytest.mark.parametrize("seed", range(3))
+def test_no_hairs_grow_in_a_veil(seed):
+    found = skeletonize(star_from_above(seed))
+    assert (found.n_components, found.n_loops, len(found.leaves), found.report.n_traced) == (1, 0, 6, 0)
+    assert found.report.n_mixed > 0
