@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import uuid
 from collections.abc import Callable, Iterator
@@ -55,6 +56,13 @@ def write_atomically(path: str | os.PathLike[str], write: Callable[[Path], objec
             os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def remove_unfinished(folder: Path) -> None:
+    """Remove the temporary files of `write_atomically` that killed processes left in a folder and those inside."""
+    for path in folder.rglob(".*"):
+        if re.fullmatch(r"\.[0-9a-f]{32}(\.\w+)?", path.name):
+            path.unlink(missing_ok=True)
 
 
 def check_place(path: str | os.PathLike[str]) -> None:

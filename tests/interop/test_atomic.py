@@ -6,7 +6,7 @@ import stat
 import pytest
 
 from glsk_o3d.errors import FileFormatError
-from glsk_o3d.interop.atomic import check_ending, write_atomically, write_json
+from glsk_o3d.interop.atomic import check_ending, remove_unfinished, write_atomically, write_json
 
 
 def test_interrupted_write_leaves_the_old_file(tmp_path):
@@ -56,3 +56,13 @@ def test_endings_of_files_to_be_written():
     check_ending("p.PNG", "preview is a picture", ".png", ".svg")
     with pytest.raises(FileFormatError, match=r"p\.jpg: the preview is a picture and its name ends in \.png or \.svg$"):
         check_ending("p.jpg", "preview is a picture", ".png", ".svg")
+
+
+def test_what_killed_processes_left_is_removed_and_nothing_else(tmp_path):
+    kept = [tmp_path / ".hidden", tmp_path / "a" / f"{'0' * 32}.ply", tmp_path / ".ledger.lock"]
+    gone = [tmp_path / f".{'0f' * 16}.ply", tmp_path / "a" / f".{'12' * 16}"]
+    (tmp_path / "a").mkdir()
+    for path in (*kept, *gone):
+        path.touch()
+    remove_unfinished(tmp_path)
+    assert {path for path in tmp_path.rglob("*") if path.is_file()} == {*kept}

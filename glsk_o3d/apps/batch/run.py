@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import BatchError, InvalidParameterError
 from ...geometry.cores import cores
-from ...interop.atomic import write_json
+from ...interop.atomic import remove_unfinished, write_json
 from ...parameters import check_number
 from .ledger import DONE, FAILED, LOCK_FILE, STARTED, Row, locked, refuse_ways_out
 from .plan import RECIPE_FILE, TILES_FOLDER, UP_TO_DATE, Plan, plan_batch
@@ -140,6 +140,8 @@ def run_batch(
             complete = True
         finally:
             crew.close(at_once=not complete)
+            if isinstance(crew, LocalWorkers):  # others may be at work on another machine
+                remove_unfinished(plan.out_dir)
     rows = {task.name: plan.ledger.rows[task.name] for task in plan.tasks}
     failed = sum(row["status"] == FAILED for row in rows.values())
     seconds = time.perf_counter() - start
