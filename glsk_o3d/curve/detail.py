@@ -13,8 +13,7 @@ from scipy.spatial import cKDTree
 from ..data.decisions import Decision
 from ..data.skeleton import OF_VERTICES, Skeleton
 from ..geometry.pairing import final_representatives
-from ..geometry.paths import maximal_paths
-from ..geometry.polylines import arc_lengths
+from ..geometry.polylines import arc_lengths, maximal_paths
 from ..geometry.vectors import TINY, norm
 from .topology.spurs import limb_decision
 

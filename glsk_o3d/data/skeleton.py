@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import InvalidParameterError, brief
 from ..geometry.groups import component_labels
-from ..geometry.paths import maximal_paths
+from ..geometry.polylines import maximal_paths
 from ..geometry.radii import supporting_points
 from ..geometry.vectors import FARTHEST_PLACE, norm
 from ..interop.packages import import_open3d, require

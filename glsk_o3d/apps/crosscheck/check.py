@@ -14,9 +14,9 @@ from ...errors import InvalidCloudError, InvalidParameterError
 from ...filters.contractor import Contractor
 from ...filters.ring_builder import RingBuilder
 from ...filters.thinner import Thinner
+from ...geometry.cotangent import Operator, ring_operator
 from ...geometry.inscribed_balls import outward_normals
 from ...geometry.neighbourhoods import spacing
-from ...geometry.operators import Operator, ring_operator
 from ...geometry.vectors import box
 from ...interop.clouds import SurfaceMesh, surface_mesh
 from ...interop.packages import require

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.sparse.linalg import eigs, eigsh
 
 from ...analysis.agreement import OperatorAgreement
-from ...geometry.operators import Operator, eigenvalues, mapped
+from ...geometry.cotangent import Operator, eigenvalues, mapped
 from ...geometry.rings import Rings
 from ...geometry.vectors import TINY, box, dot, norm
 from ...interop.packages import require
