@@ -15,8 +15,7 @@ from ..data.graph import OF_VERTICES
 from ..data.skeleton import Skeleton
 from ..geometry.numbers import derived, speed
 from ..geometry.pairing import final_representatives
-from ..geometry.paths import maximal_paths
-from ..geometry.polylines import arc_lengths
+from ..geometry.polylines import arc_lengths, maximal_paths
 from ..geometry.vectors import TINY, norm
 from .topology.spurs import limb_candidate
 

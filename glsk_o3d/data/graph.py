@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..geometry.groups import component_labels
-from ..geometry.paths import maximal_paths
+from ..geometry.polylines import maximal_paths
 from ..geometry.radii import supporting_points
 from ..geometry.vectors import norm
 from .derived import Changeable, derived

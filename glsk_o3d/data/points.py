@@ -13,9 +13,8 @@ from ..errors import StageError
 from ..geometry.area_sampling import SurfaceSample, sample_by_area, vertices_mislead
 from ..geometry.frame import Frame, not_finite, to_working_frame
 from ..geometry.grid_sampling import sample_cloud
-from ..geometry.neighbourhoods import principal, row_medians
+from ..geometry.neighbourhoods import principal, reach_next_rows, row_medians
 from ..geometry.numbers import fitted, speed
-from ..geometry.rows import reach_next_rows
 from ..geometry.vectors import TINY, Ints, finite_rows
 from ..interop.clouds import cloud_counts, surface_mesh, to_point_cloud
 from .point_map import PointMap

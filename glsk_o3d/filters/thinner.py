@@ -8,10 +8,9 @@ from scipy.sparse import csr_array
 
 from ..data.points import POINTS, Points, default_k, default_size
 from ..geometry.eigen import principal_parts
-from ..geometry.neighbourhoods import nearest_left, principal, wide_covariances
+from ..geometry.neighbourhoods import nearest_left, principal, reach_next_rows, wide_covariances
 from ..geometry.numbers import derived, fitted, measured, speed
 from ..geometry.pairing import Pairs, merge_pairs
-from ..geometry.rows import reach_next_rows
 from ..geometry.vectors import TINY, norm
 from ..parameters import documented, parameter
 from ..pipeline import Filter, RunContext

@@ -8,7 +8,7 @@ from functools import partial
 from typing import TypeVar
 
 Item = TypeVar("Item")
-Made = TypeVar("Made")
+Result = TypeVar("Result")
 
 
 def cores() -> int:
@@ -22,27 +22,26 @@ def threads() -> int:
     return int(wanted) if wanted.isdecimal() and int(wanted) > 0 else cores()
 
 
-def in_threads(function: Callable[[Item], Made], items: Iterable[Item], most: int | None = None) -> Iterator[Made]:
-    """What a function makes of each item, in their order, computed on `threads()` threads, at `most` so many.
+def in_threads(function: Callable[[Item], Result], items: Iterable[Item], most: int | None = None) -> Iterator[Result]:
+    """Results of a function for each item, in their order, computed on `threads()` threads, or `most` if fewer.
 
-    No more items than there are threads are taken ahead of the one that is given. It gains where most time is NumPy's,
-    which lets other threads go on. Where no more threads can be started a function may be called twice of one item, so
-    it must have no other effects.
+    No more items than there are threads are taken ahead of the result that is given. It gains where most time is
+    NumPy's, which lets other threads go on. Where no thread can be started a function may be called twice of one item.
     """
     n = min(threads(), most or threads())
     if n == 1:
         yield from map(function, items)
         return
-    pool, made = ThreadPoolExecutor(n), deque[Callable[[], Made]]()
+    pool, results = ThreadPoolExecutor(n), deque[Callable[[], Result]]()
     try:
         for item in items:
             try:
-                made.append(pool.submit(function, item).result)
+                results.append(pool.submit(function, item).result)
             except RuntimeError:  # an interpreter that ends starts no threads, nor does a system that has too many
-                made.append(partial(function, item))
-            if len(made) > n:
-                yield made.popleft()()
-        while made:
-            yield made.popleft()()
+                results.append(partial(function, item))
+            if len(results) > n:
+                yield results.popleft()()
+        while results:
+            yield results.popleft()()
     finally:
         pool.shutdown(cancel_futures=True)

@@ -9,19 +9,20 @@ COLLINEAR_SINE = 1e-12  # derived: sine below which two directions count as one
 def delaunay_star(offsets: np.ndarray, valid: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Ring of the origin in the 2-D Delaunay triangulation of the origin and its neighbours, for many origins.
 
-    Inversion about the origin, ``q = x / |x|^2``, turns circles through it into lines. A neighbour shares a Delaunay
-    edge with the origin exactly when its image is a corner of the convex hull of the images and of the origin, which
-    stands for infinity. An origin inside the hull gives a closed ring; an origin on the hull is a border point, and its
-    ring is an open fan that starts and ends there. Gift wrapping walks all hulls in step, so no triangulation is made.
-
     `offsets` (n, k, 2) lead from each origin to its neighbours, of which those that are `valid` (n, k) and do not
     coincide with it are used. The rings are (n, r) positions in counter-clockwise order, padded with -1; a closed one
-    starts at the nearest neighbour, a fan at its first border neighbour. Also returned is which rings close, (n,) bool.
+    starts at the nearest neighbour. An origin on the hull of its neighbours is a border point, and its ring an open fan
+    from its first border neighbour to its last. Also returned is which rings close, (n,) bool.
 
     Of several neighbours on one empty circle through the origin the two outer ones are kept, so that the diagonals of a
     square grid are no ring edges. Collinear neighbourhoods give the nearest neighbour on each side as a fan. Of
     coincident neighbours one is kept.
     """
+    # Strategy: inversion about the origin, q = x / |x|^2, turns circles through it into lines (Brown 1979, "Voronoi
+    # diagrams from convex hulls"). A neighbour shares a Delaunay edge with the origin exactly when its image is a
+    # corner of the convex hull of the images and of the origin, which stands for infinity: a ring is closed if the
+    # origin is inside, and else opens where the walk around the hull meets it. Gift wrapping (Jarvis 1973) walks all
+    # hulls in step, one corner at a time, and drops those that are done. The plane is that of the complex numbers.
     offsets = np.asarray(offsets, float)
     if offsets.shape[1] == 0:
         return np.empty((len(offsets), 0), int), np.zeros(len(offsets), bool)
@@ -32,52 +33,47 @@ def delaunay_star(offsets: np.ndarray, valid: np.ndarray | None = None) -> tuple
     if valid is not None:
         usable &= valid
     inverse = np.divide(1.0, squared, out=np.zeros_like(squared), where=usable)
-    # The inverted plane is that of the complex numbers; column k is its origin.
-    q = np.zeros((n, k + 1), complex)
+    q = np.zeros((n, k + 1), complex)  # column k is the origin
     np.multiply(x, inverse, out=q.real[:, :k])
     np.multiply(y, inverse, out=q.imag[:, :k])
     q[:, :k][~usable] = np.nan  # on no line
-    shut = np.zeros((n, k + 1))
-
     walk = np.full((n, k + 2), -1)
-    start = np.argmax(inverse, axis=1)
-    walk[:, 0] = start
+    walk[:, 0] = start = np.argmax(inverse, axis=1)
     rows = np.flatnonzero(usable.any(axis=1))
-    q, shut, first = q[rows], shut[rows], start[rows]
-    here, line = first, np.arange(len(rows))
+    q, first = q[rows], start[rows]
+    passed, corner, line = np.zeros(q.shape), first, np.arange(len(rows))
     # The farthest image is a hull corner; everything lies to the left of its tangent.
-    ahead = 1j * q[line, here]
+    ahead = 1j * q[line, corner]
     widest = 2 * np.abs(ahead)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        way, turn = _seen(q, line, here, ahead)
+        direction, turn = _seen(q, line, corner, ahead)
         for step in range(1, k + 2):
-            shut[line, first] = 0
-            shut[line, here] = -np.inf
-            # The cotangent of the turn: falls on ]0, pi[, and is exact for small turns. 0 / 0 is where we are.
-            cotangent = turn.real / np.maximum(turn.imag, 0) + shut
+            passed[line, first] = 0
+            passed[line, corner] = -np.inf
+            # The cotangent of the turn: falls on ]0, pi[, and is exact for small turns. 0 / 0 is at the corner itself.
+            cotangent = turn.real / np.maximum(turn.imag, 0) + passed
             best = np.argmax(np.fmax(cotangent, -np.inf), axis=1)
             best = np.where(cotangent[line, best] > -np.inf, best, first)  # straight back, along a line
-            ahead = way[line, best]
+            ahead = direction[line, best]
             onward, turn = _seen(q, line, best, ahead)
             beside = np.abs(turn.imag) <= (COLLINEAR_SINE * widest * np.abs(ahead))[:, None]
-            if np.count_nonzero(beside) > 2 * len(line):  # more than where we are and where we go
+            if np.count_nonzero(beside) > 2 * len(line):  # more than this corner and the next
                 several = np.flatnonzero(beside.sum(axis=1) > 2)
-                best[several] = _farthest(way[several], shut[several] == 0, best[several])
-                ahead = way[line, best]
+                best[several] = _farthest(direction[several], passed[several] == 0, best[several])
+                ahead = direction[line, best]
                 onward[several], turn[several] = _seen(q[several], line[: len(several)], best[several], ahead[several])
             going = best != first
             if not going.any():
                 break
             if not going.all():
-                left = np.flatnonzero(going)
-                rows, first, best, widest, line = *(a[left] for a in (rows, first, best, widest)), line[: len(left)]
-                q, shut, onward, turn = (a.take(left, axis=0) for a in (q, shut, onward, turn))
-            walk[rows, step] = here = best
-            way = onward
+                kept = np.flatnonzero(going)
+                rows, first, best, widest, line = *(a[kept] for a in (rows, first, best, widest)), line[: len(kept)]
+                q, passed, onward, turn = (a.take(kept, axis=0) for a in (q, passed, onward, turn))
+            walk[rows, step] = corner = best
+            direction = onward
 
     # Cut the walk at the origin, where it meets it.
-    size = (walk >= 0).sum(axis=1)
-    size[~usable.any(axis=1)] = 0
+    size = np.where(usable.any(axis=1), (walk >= 0).sum(axis=1), 0)
     meets = (walk == k).any(axis=1)
     cut = np.where(meets, np.argmax(walk == k, axis=1) + 1, 0)
     length = size - meets
@@ -87,16 +83,16 @@ def delaunay_star(offsets: np.ndarray, valid: np.ndarray | None = None) -> tuple
     return ring, ~meets & (size > 2)
 
 
-def _seen(q: np.ndarray, line: np.ndarray, here: np.ndarray, ahead: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The images from where each walk is, and the same turned back by the way it came."""
-    way = q - q[line, here][:, None]
-    return way, way * ahead.conj()[:, None]
+def _seen(q: np.ndarray, line: np.ndarray, corner: np.ndarray, ahead: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Directions of the images from the corner where each walk is, and the same relative to the direction before."""
+    direction = q - q[line, corner][:, None]
+    return direction, direction * ahead.conj()[:, None]
 
 
-def _farthest(way: np.ndarray, usable: np.ndarray, best: np.ndarray) -> np.ndarray:
+def _farthest(direction: np.ndarray, usable: np.ndarray, best: np.ndarray) -> np.ndarray:
     """Among the images on one hull edge with the best one, the farthest; but never step over the origin."""
-    line, length = np.arange(len(best)), np.abs(way)
-    turn = way * way[line, best].conj()[:, None]
+    line, length = np.arange(len(best)), np.abs(direction)
+    turn = direction * direction[line, best].conj()[:, None]
     same = np.abs(turn.imag) <= COLLINEAR_SINE * length[line, best][:, None] * length
     reach = np.where(same & usable & (turn.real > 0), length, -1.0)
     reach[:, -1][reach[:, -1] > 0] = np.inf

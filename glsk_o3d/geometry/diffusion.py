@@ -12,9 +12,9 @@ LEAST_BEND = 1e-12  # derived: of what a step may gain, that is more than roundi
 class Diffusion:
     r"""Implicit diffusion over the links between points (n, 3) and their nearest neighbours (n, k), itself first.
 
-    One step of backward Euler, :math:`(I + \ell^2 L) u' = u`, with the Laplacian of the links: on a plane their lengths
-    have a mean square :math:`\rho^2` at every point, and :math:`L = 4 / \rho^2 (I - D^{-1} W)` tends to :math:`-\Delta`
-    as points grow. What varies over less than the length :math:`\ell` is smoothed; constants stay.
+    One step of backward Euler, :math:`(I + \ell^2 L) u' = u` (Desbrun et al. 1999), with the Laplacian of the links: on
+    a plane their lengths have a mean square :math:`\rho^2` at every point, and :math:`L = 4 / \rho^2 (I - D^{-1} W)`
+    tends to :math:`-\Delta` as points grow. What varies over less than the length :math:`\ell` is smoothed.
     """
 
     def __init__(self, points: np.ndarray, neighbours: np.ndarray) -> None:
@@ -35,22 +35,19 @@ class Diffusion:
         # as wide as the values: NumPy is slow at stretching columns
         diagonal = np.maximum(hold + self._degree, TINY).repeat(values.shape[1]).reshape(values.shape)
         mean: Floats = values.mean(axis=0)  # what is far from the origin would lose digits
-        found: Floats = values - mean
-        residual, inverse = self._links @ found - self._degree[:, None] * found, 1 / diagonal
+        x: Floats = values - mean
+        residual, inverse = self._links @ x - self._degree[:, None] * x, 1 / diagonal
         ahead = residual * inverse
         size = np.einsum("nc,nc->", residual, ahead)  # of all columns: those of positions turn with them
         for _ in range(DIFFUSION_STEPS):
-            curved = diagonal * ahead
-            curved -= self._links @ ahead
+            curved = diagonal * ahead - self._links @ ahead
             bend = np.einsum("nc,nc->", ahead, curved)
             if not bend > LEAST_BEND * size:
                 break
             share = size / bend
-            curved *= share
-            residual -= curved
-            found += np.multiply(ahead, share, out=curved)
-            step = np.multiply(residual, inverse, out=curved)
+            residual -= share * curved
+            x += share * ahead
+            step = residual * inverse
             before, size = size, np.einsum("nc,nc->", residual, step)
-            ahead *= size / before
-            ahead += step
-        return found + mean
+            ahead = step + size / before * ahead
+        return x + mean

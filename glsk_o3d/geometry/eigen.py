@@ -1,9 +1,6 @@
 """Eigenvalues of many symmetric 3 x 3 matrices in closed form (Smith 1961), and the directions of the outer ones.
 
-Several times faster than NumPy's, one matrix at a time; as exact where the eigenvalue stands out.
-
-The matrices are a (6, n) array of their entries xx, xy, xz, yy, yz, zz: sums over many small matrices then run along
-the memory.
+The matrices are a (6, n) array of their entries xx, xy, xz, yy, yz, zz: sums over many then run along the memory.
 """
 
 import numpy as np
@@ -59,11 +56,9 @@ def _direction(shape: np.ndarray, value: np.ndarray, which: int) -> np.ndarray:
     adjugate = np.stack([d * f - e * e, c * e - b * f, b * e - c * d, a * f - c * c, b * c - a * e, a * d - b * b])
     diagonal = adjugate[[0, 3, 5]]
     longest = np.argmax(diagonal, axis=0)
-    line = np.arange(len(longest))
-    vectors = adjugate.T[line[:, None], FULL[longest]]
-    vectors = unit(vectors)
+    vectors = unit(adjugate.T[np.arange(len(longest))[:, None], FULL[longest]])
     # its trace is the product of the distances to the two other eigenvalues
-    dim = np.flatnonzero(diagonal.sum(axis=0) < 3 * EIGENVALUES_APART)
-    if len(dim):
-        vectors[dim] = np.linalg.eigh(shape.T[dim][:, FULL])[1][:, :, which]
+    unclear = np.flatnonzero(diagonal.sum(axis=0) < 3 * EIGENVALUES_APART)
+    if len(unclear):
+        vectors[unclear] = np.linalg.eigh(shape.T[unclear][:, FULL])[1][:, :, which]
     return vectors

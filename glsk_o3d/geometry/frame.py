@@ -38,7 +38,7 @@ class Frame:
     def of(cls, points: np.ndarray, by: str = "box") -> Frame:
         """The frame in which the longest side of a box is 1.6.
 
-        `by` is "box" for the axis-aligned bounding box, as published, or "spread" for the box that has the points'
+        `by` is "box" for the axis-aligned bounding box (Wen et al. 2024), or "spread" for the box that has the points'
         spread if it is evenly filled, whose longest side and diagonal do not change when the cloud is turned.
         """
         low, high = box(points)
@@ -58,11 +58,7 @@ class Frame:
         return cls(centre, float(scale), half / scale, float(diagonal / unit), mean / unit, float(reach / unit))
 
     def beyond(self, points: np.ndarray) -> np.ndarray:
-        """Points of the frame that are far out of the cloud, (n,) bool array.
-
-        Out of its bounding box or, where the frame turns with the cloud, of the ball around its mean, 1.2 times as
-        large.
-        """
+        """Points of the frame out of the cloud's box, or its ball if the frame turns, 1.2 times as large, (n,) bool."""
         if self.mean is None:
             return (np.abs(points) > np.maximum(CLOUD_SLACK * self.half_extent, FLAT_BOX * self.diagonal)).any(axis=1)
         return norm(points - self.mean) > CLOUD_SLACK * self.reach
@@ -80,10 +76,8 @@ def not_finite(n: int, total: int, first: int) -> InvalidCloudError:
     """The error for n of all points, the first at an index, that have no finite coordinates."""
     if n == total:
         return InvalidCloudError(f"none of its {n} points has finite coordinates: there is no cloud to work with")
-    return InvalidCloudError(
-        f"{n} of {total} points have NaN or infinite coordinates, the first at index {first}: drop them with "
-        "drop_invalid (--drop-invalid), or remove them first"
-    )
+    which = f"{n} of {total} points have NaN or infinite coordinates, the first at index {first}"
+    return InvalidCloudError(f"{which}: drop them with drop_invalid (--drop-invalid), or remove them first")
 
 
 def to_working_frame(
@@ -95,8 +89,7 @@ def to_working_frame(
     points that are all distinct. Copies are points much nearer to each other than to others; of each group the first in
     Morton order stays. Returned are the frame; the m distinct points in Morton order (m, 3); which of the given points
     they are (m,); for each given point its row among them; how many points each row stands for; and the neighbours of
-    each row. InvalidCloudError if fewer than 8 points are distinct, or if they are so far apart or so near that squares
-    overflow.
+    each row. InvalidCloudError if fewer than 8 points are distinct, or as of `check_extent`.
     """
     if len(points) < MIN_POINTS:
         raise InvalidCloudError(f"{len(points)} finite points: a skeleton needs at least {MIN_POINTS} distinct ones")
@@ -116,40 +109,32 @@ def to_working_frame(
         first = np.unique(group, return_index=True)[1]
         if len(first) == len(cloud):
             return frame, cloud, kept, row, weight, near
-        stays = np.zeros(len(cloud), bool)
-        stays[first] = True
-        merged = (np.cumsum(stays) - 1)[first[group]]
         if len(first) < MIN_POINTS:
-            raise InvalidCloudError(
-                f"{len(points)} points but only {len(first)} distinct ones: a skeleton needs at least {MIN_POINTS}"
-            )
-        most = np.zeros(len(first))
+            few = f"{len(points)} points but only {len(first)} distinct ones"
+            raise InvalidCloudError(f"{few}: a skeleton needs at least {MIN_POINTS}")
+        stays = np.sort(first)
+        merged, most = np.searchsorted(stays, first[group]), np.zeros(len(first))
         np.maximum.at(most, merged, weight)
         kept, row, weight = kept[stays], merged[row], most
 
 
 def _places(cloud: np.ndarray, distance: np.ndarray, near: np.ndarray) -> np.ndarray:
-    """The place of each point, (n,) int array: copies have one; `distance` and `near` (n, k) are to its neighbours.
-
-    Where these may all be copies, it is asked how far points in a square as wide as half of the cloud are apart: one
-    place is what has all its neighbours in it. Of more than there can be places like it, it is an object, far away.
-    """
+    """The place of each point, (n,) int array: copies have one; `distance` and `near` (n, k) are to its neighbours."""
+    # Where the neighbours may all be copies, the spacing is that of n points in a square as wide as half of the cloud:
+    # a group with all its neighbours in it is one place, but one of more than sqrt(n) points is an object, far away.
     n, last = len(cloud), distance[:, -1:]
     middle = 2 * np.median(norm(cloud - np.median(cloud, axis=0)))  # of outliers it knows nothing
-    apart = np.maximum(last, middle / np.sqrt(n))
+    spacing = np.maximum(last, middle / np.sqrt(n))
     for _ in range(2):
-        place, copy = np.nonzero(distance <= np.maximum(SAME_POINT * apart, ROUNDINGS))
-        group = component_labels(n, np.column_stack([place, near[place, copy]])[place != near[place, copy]])
-        away, count = np.bincount(group, (group[near] != group[:, None]).any(axis=1)), np.bincount(group)
-        apart = np.where(((away > 0) | (count**2 > n))[group, None], last, apart)
+        place, copy = np.nonzero(distance <= np.maximum(SAME_POINT * spacing, ROUNDINGS))
+        group = component_labels(n, np.stack([place, near[place, copy]], axis=1)[place != near[place, copy]])
+        outside, count = np.bincount(group, (group[near] != group[:, None]).any(axis=1)), np.bincount(group)
+        spacing = np.where(((outside > 0) | (count**2 > n))[group, None], last, spacing)
     return group
 
 
 def check_extent(points: np.ndarray, n: int | None = None) -> None:
-    """Raise InvalidCloudError where points coincide or are only roundings apart, or squares overflow or vanish.
-
-    `points` may be two corners of the box of n of them.
-    """
+    """Raise InvalidCloudError where n points, given or by the corners of their box, coincide, or squares overflow."""
     low, high = box(points)
     with np.errstate(over="ignore"):
         extent = (high - low).max()
@@ -157,9 +142,8 @@ def check_extent(points: np.ndarray, n: int | None = None) -> None:
         raise InvalidCloudError(f"all {n or len(points)} points coincide: there is nothing to skeletonise")
     if not MIN_EXTENT < extent < MAX_EXTENT:
         raise InvalidCloudError(f"the cloud is {extent:g} long, and its square is out of range: rescale it")
-    away = max(high.max(), -low.min())
-    if extent < MIN_STEPS * np.spacing(away):
-        raise InvalidCloudError(
-            f"the cloud is {extent:g} long and {away:g} away from the origin, where numbers are {np.spacing(away):g} "
-            "apart: its shape is lost in rounding; subtract an offset before the coordinates are first stored"
-        )
+    distance = max(high.max(), -low.min())
+    if extent < MIN_STEPS * np.spacing(distance):
+        where = f"{distance:g} away from the origin, where numbers are {np.spacing(distance):g} apart"
+        what = "its shape is lost in rounding; subtract an offset before the coordinates are first stored"
+        raise InvalidCloudError(f"the cloud is {extent:g} long and {where}: {what}")

@@ -15,9 +15,9 @@ SPACING_NEIGHBOUR = 3  # fitted: which of the nearest points is as far away as t
 
 
 def linked(places: np.ndarray, ends: np.ndarray) -> csr_matrix:
-    """Symmetric (n, n) matrix of the lengths of links between places (n, 3), given by their ends (e, 2).
+    """Symmetric (n, n) matrix of the lengths of links between places (n, 3), given by their ends (e, 2), or repeatedly.
 
-    A link counts once however often it is given. Those of no length stay links, and a place has none with itself.
+    Links of no length stay links, and a place has none with itself.
     """
     n, ends = len(places), ends[ends[:, 0] != ends[:, 1]]
     links = csr_matrix(coo_matrix((np.ones(2 * len(ends)), np.concatenate([ends, ends[:, ::-1]]).T), shape=(n, n)))
@@ -30,12 +30,11 @@ def near_links(points: np.ndarray) -> csr_matrix:
     """Links, as from `linked`, of points with their nearest, none longer than twice the spacing around either end."""
     n = len(points)
     if n == 0:
-        return linked(points, np.empty((0, 2), int))
+        return csr_matrix((0, 0))
     distance, neighbour = nearest_neighbours(points, min(LINK_NEIGHBOURS + 1, n))
     spacing = row_medians(distance[:, min(SPACING_NEIGHBOUR, n - 1)][neighbour])
-    near = distance <= LINK_SPACINGS * np.minimum(spacing[:, None], spacing[neighbour])
-    row, column = np.nonzero(near)
-    return linked(points, np.column_stack([row, neighbour[row, column]]))
+    row, column = np.nonzero(distance <= LINK_SPACINGS * np.minimum(spacing[:, None], spacing[neighbour]))
+    return linked(points, np.stack([row, neighbour[row, column]], axis=1))
 
 
 def link_growth(links: csr_matrix) -> np.ndarray:
@@ -51,13 +50,21 @@ def link_growth(links: csr_matrix) -> np.ndarray:
     return growth
 
 
+def steps(links: csr_matrix) -> csr_matrix:
+    """1 for every place itself and those that it is linked with."""
+    step = csr_matrix(links + identity(links.shape[0]))
+    step.data[:] = 1
+    return step
+
+
 def join_pieces(places: np.ndarray, links: csr_matrix, longest: np.ndarray) -> tuple[csr_matrix, np.ndarray]:
     """Join the connected pieces of a graph where they are nearest to each other, until they are one.
 
-    A gap that neither end points across counts twice. No added link is longer than `longest` (n,) at both of its ends;
-    unless that is infinite, several pieces may be left. Returns the links and the ends of those added, (a, 2), which
-    close no loop.
+    A gap that neither end points across counts twice. No added link is longer than `longest` (n,) at both of its ends:
+    several pieces may remain. Returns the links and the ends of those added, (a, 2), which close no loop.
     """
+    # Strategy: in every round the pieces are joined by a minimum spanning tree. Candidates are the gaps between near
+    # places of different pieces, and from a piece that has none, but the largest, its shortest gap to another place.
     added = np.empty((0, 2), int)
     piece = connected_components(links, directed=False)[1]
     _, neighbour = nearest_neighbours(places, min(LINK_NEIGHBOURS + 1, len(places)))
@@ -67,33 +74,24 @@ def join_pieces(places: np.ndarray, links: csr_matrix, longest: np.ndarray) -> t
     outward = unit(places - (near @ places) / np.diff(near.indptr)[:, None])
     while piece.max() > 0:
         row, column = np.nonzero(piece[neighbour] != piece[:, None])
-        ends = np.column_stack([row, neighbour[row, column]])
-        lost = np.setdiff1d(piece, piece[row])  # pieces that see nothing but themselves
-        some = []
-        for each in lost[lost != np.bincount(piece).argmax()]:
-            inside, others = np.flatnonzero(piece == each), np.flatnonzero(piece != each)
-            distance, found = cKDTree(places[others]).query(places[inside])
-            some.append(np.array([inside[distance.argmin()], others[found[distance.argmin()]]]))
-        ends = np.concatenate([ends, *(pair[None] for pair in some)])
-        way = places[ends[:, 1]] - places[ends[:, 0]]
-        length = norm(way)
+        gaps = [np.stack([row, neighbour[row, column]], axis=1)]
+        lonely = np.setdiff1d(piece, piece[row])
+        for number in lonely[lonely != np.bincount(piece).argmax()].tolist():
+            inside, others = np.flatnonzero(piece == number), np.flatnonzero(piece != number)
+            distance, nearest = cKDTree(places[others]).query(places[inside])
+            gaps.append(np.array([[inside[distance.argmin()], others[nearest[distance.argmin()]]]]))
+        ends = np.concatenate(gaps)
+        gap = places[ends[:, 1]] - places[ends[:, 0]]
+        length = norm(gap)
         short = length <= longest[ends].max(axis=1)
-        ends, way, length = ends[short], way[short], length[short]
+        ends, gap, length = ends[short], gap[short], length[short]
         if len(ends) == 0:
             break
-        ahead = np.maximum(dot(outward[ends[:, 0]], way), -dot(outward[ends[:, 1]], way)) / np.maximum(length, TINY)
+        ahead = np.maximum(dot(outward[ends[:, 0]], gap), -dot(outward[ends[:, 1]], gap)) / np.maximum(length, TINY)
         fresh = ends[spanning(piece, ends, length * (2 - np.maximum(ahead, 0)))]
         added = np.concatenate([added, fresh])
         piece = component_labels(int(piece.max()) + 1, piece[fresh])[piece]
-    row, column = links.nonzero()
-    return linked(places, np.concatenate([np.column_stack([row, column]), added])), added
-
-
-def steps(links: csr_matrix) -> csr_matrix:
-    """1 for every place itself and those that it is linked with."""
-    step = csr_matrix(links + identity(links.shape[0]))
-    step.data[:] = 1
-    return step
+    return linked(places, np.concatenate([np.stack(links.nonzero(), axis=1), added])), added
 
 
 def spanning(piece: np.ndarray, ends: np.ndarray, length: np.ndarray) -> np.ndarray:
@@ -109,20 +107,20 @@ def spanning(piece: np.ndarray, ends: np.ndarray, length: np.ndarray) -> np.ndar
 
 
 def slice_centres(points: np.ndarray, links: csr_matrix, distance: np.ndarray, width: float) -> np.ndarray:
-    """The centre of the slice of a part that every point is in the middle of, (n, 3) float array.
+    """The centre of the slice that every point is in the middle of, (n, 3) float array.
 
-    Slices are connected pieces of what lies between two geodesic distances from the root, a `width` apart (Verroust and
-    Lazarus 1999, "Extracting skeletal curves from 3D scattered data"), twice, the second time half a width farther on.
+    Slices are connected pieces between two geodesic distances from the root, a `width` apart (Verroust and Lazarus
+    1999, "Extracting skeletal curves from 3D scattered data"), and again half a width farther on.
     """
     n = len(points)
     row, column = links.nonzero()
-    centre, off = np.empty((n, 3)), np.full(n, np.inf)
+    centre, nearest = np.empty((n, 3)), np.full(n, np.inf)
     for shift in (0, 0.5):
         place = distance / width + shift
         inside = np.floor(place[row]) == np.floor(place[column])
-        piece = component_labels(n, np.column_stack([row[inside], column[inside]]))
+        piece = component_labels(n, np.stack([row[inside], column[inside]], axis=1))
         mean = group_sum(points, piece, piece.max(initial=-1) + 1) / np.bincount(piece)[:, None]
-        nearer = np.abs(place % 1 - 0.5) < off
-        off[nearer] = np.abs(place % 1 - 0.5)[nearer]
-        centre[nearer] = mean[piece[nearer]]
+        off = np.abs(place % 1 - 0.5)
+        nearer = off < nearest
+        nearest[nearer], centre[nearer] = off[nearer], mean[piece[nearer]]
     return centre

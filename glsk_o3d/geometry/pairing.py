@@ -17,16 +17,15 @@ def merge_pairs(
     most: np.ndarray | float = np.inf,
     least: float = 0,
 ) -> np.ndarray:
-    """Merge mutual nearest neighbours, round by round, while `choose` takes pairs and more than `least` are left.
+    """Merge mutual nearest neighbours, round by round, while `choose` takes pairs and more than `least` remain.
 
     Points (n, 3) are all different, and their nearest neighbours (n, k) begin with the point itself. `choose` is given
     pairs and the mass of every point: how many it stands for, at most `most`; 0 if it was swallowed. Returned is the
-    point that each was merged into, (n,) int array; itself for those that are left.
+    point that each was merged into, (n,) int array, maybe itself.
     """
     representative, mass, nearest = np.arange(len(points)), np.ones(len(points)), neighbours[:, 1].copy()
     while np.count_nonzero(mass > 0) > least:  # of truth values it is faster
-        left = (mass > 0) & (mass + 1 <= most)
-        kept, swallowed = choose(mutual_pairs(points, neighbours, left, nearest), mass)
+        kept, swallowed = choose(_mutual_pairs(points, neighbours, (mass > 0) & (mass + 1 <= most), nearest), mass)
         if len(kept) == 0:
             break
         representative[swallowed] = kept
@@ -42,19 +41,16 @@ def final_representatives(representative: np.ndarray) -> np.ndarray:
     return representative
 
 
-def mutual_pairs(points: np.ndarray, neighbours: np.ndarray, left: np.ndarray, nearest: np.ndarray) -> Pairs:
-    """Pairs of points left that are each other's nearest; of each pair the one with more room around it is kept.
-
-    The `nearest` (n,) of a point, itself if none of its neighbours is left, is looked up again if it is not left.
-    """
-    stale = np.flatnonzero(left & ~left.take(nearest))
+def _mutual_pairs(points: np.ndarray, neighbours: np.ndarray, remaining: np.ndarray, nearest: np.ndarray) -> Pairs:
+    """Pairs of remaining points that are each other's `nearest` (n,), which is updated: the roomier point is kept."""
+    stale = np.flatnonzero(remaining & ~remaining.take(nearest))
     candidates = neighbours.take(stale, axis=0)
-    there = left.take(candidates)
-    there[:, 0] = False
-    nearest[stale] = candidates[np.arange(len(stale)), np.argmax(there, axis=1)]
-    one = np.flatnonzero(left & (np.arange(len(points)) < nearest))
+    present = remaining.take(candidates)
+    present[:, 0] = False
+    nearest[stale] = candidates[np.arange(len(stale)), np.argmax(present, axis=1)]
+    one = np.flatnonzero(remaining & (np.arange(len(points)) < nearest))
     one = one[nearest[nearest[one]] == one]
     other = nearest[one]
-    ways = [points.take(neighbours[p, -1], axis=0) - points.take(p, axis=0) for p in (one, other)]
-    swap = dot(ways[1], ways[1]) > dot(ways[0], ways[0])
+    rooms = [points.take(neighbours[p, -1], axis=0) - points.take(p, axis=0) for p in (one, other)]
+    swap = dot(rooms[1], rooms[1]) > dot(rooms[0], rooms[0])
     return np.where(swap, other, one), np.where(swap, one, other)

@@ -1,4 +1,4 @@
-"""How far points are from polylines, and the places on the edges of a graph that are nearest to points."""
+"""Paths of a graph, lengths along polylines, and the places on the edges of a graph that are nearest to points."""
 
 from collections.abc import Sequence
 
@@ -9,6 +9,28 @@ from .vectors import TINY, Floats, dot, norm
 
 ROUNDING = np.finfo(float).eps  # derived: of a number, over itself
 POLYLINE_CHUNK = 2**20  # speed: pairs of a point and an edge at a time: memory stays flat
+NEAREST_TIE = 1e-9  # derived: of roundings, which must not choose between the edges of a vertex
+
+
+def maximal_paths(n: int, edges: np.ndarray) -> list[tuple[list[int], list[int]]]:
+    """Paths between the n vertices of a graph that have not two edges, each as its vertices and its edges in order.
+
+    The edges (e, 2) come once each, without loops. A ring without such a vertex starts and ends at its first one.
+    """
+    links: list[dict[int, int]] = [{} for _ in range(n)]
+    for edge, (a, b) in enumerate(edges.tolist()):
+        links[a][b] = links[b][a] = edge
+    degree, paths = [len(ends) for ends in links], []
+    for start in (*(v for v in range(n) if degree[v] != 2), *range(n)):
+        while links[start]:
+            vertices, path = [start], list[int]()
+            while not path or (vertices[-1] != start and degree[vertices[-1]] == 2):
+                vertex, edge = next(iter(links[vertices[-1]].items()))
+                del links[vertices[-1]][vertex], links[vertex][vertices[-1]]
+                vertices.append(vertex)
+                path.append(edge)
+            paths.append((vertices, path))
+    return paths
 
 
 def arc_lengths(path: np.ndarray) -> np.ndarray:
@@ -19,20 +41,17 @@ def arc_lengths(path: np.ndarray) -> np.ndarray:
 
 
 def place_at(path: np.ndarray, lengths: np.ndarray, length: float | np.ndarray) -> Floats:
-    """The place so far along a path, (p, 3) float array with its `arc_lengths`; (3,), or (k, 3) for k lengths."""
-    places = np.empty((*np.shape(length), 3))
-    for axis in range(3):
-        places[..., axis] = np.interp(length, lengths, path[:, axis])
-    return places
+    """The place at a length along a path, (p, 3) float array with its `arc_lengths`; (3,), or (k, 3) for k lengths."""
+    return np.stack([np.interp(length, lengths, column) for column in path.T], axis=-1)
 
 
 def relative_distance(
     points: np.ndarray, vertices: np.ndarray, surface: np.ndarray, paths: Sequence[np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Distance of points (n, 3) from some paths over the distance of the surface from these, and the latter, two (n,).
+    """Distance of points (n, 3) from paths over the distance of the surface from these, and the latter, two (n,).
 
-    Paths are numbers of `vertices` (M, 3), from which the surface is `surface` (M,) away, and linearly between them. Of
-    all edges that one counts where the ratio is least.
+    Paths are numbers of `vertices` (M, 3), from which the surface is `surface` (M,) away, and linearly between them.
+    The edge counts where the ratio is least.
     """
     a, b = (np.concatenate([path[part] for path in paths]) for part in (slice(-1), slice(1, None)))
     start, step = vertices[a], vertices[b] - vertices[a]
@@ -50,14 +69,11 @@ def relative_distance(
         squared = dot(p, p)[:, None] - 2 * p @ start.T + dot(start, start)
         foot = np.clip(along, 0, length)
         distance = np.sqrt(np.maximum(squared + foot * (foot - 2 * along), 0))
-        there = np.maximum(surface[a] + foot / np.maximum(length, TINY) * (surface[b] - surface[a]), least)
-        over = distance / there
-        edge, every = over.argmin(axis=1), np.arange(len(p))
-        ratio[first : first + rows], nearest[first : first + rows] = over[every, edge], there[every, edge]
+        thickness = np.maximum(surface[a] + foot / np.maximum(length, TINY) * (surface[b] - surface[a]), least)
+        ratios = distance / thickness
+        best = np.arange(len(p)), ratios.argmin(axis=1)
+        ratio[first : first + rows], nearest[first : first + rows] = ratios[best], thickness[best]
     return ratio, nearest
-
-
-NEAREST_TIE = 1e-9  # derived: of roundings, which must not choose between the edges of a vertex
 
 
 def incident_edges(edges: np.ndarray, m: int) -> np.ndarray:
@@ -79,24 +95,23 @@ def nearest_on_edges(
     """
     edge, t, best = np.zeros(len(p), int), np.zeros(len(p)), np.full(len(p), np.inf)
     starts, p = x.T.take(edges[:, 0], axis=1), np.ascontiguousarray(p.T)  # along the memory
-    ways = x.T.take(edges[:, 1], axis=1) - starts
-    lengths = np.maximum((ways * ways).sum(axis=0), TINY)  # squared
+    directions = x.T.take(edges[:, 1], axis=1) - starts
+    squared_lengths = np.maximum((directions * directions).sum(axis=0), TINY)
     for column in candidates.T:
-        some = np.flatnonzero(column >= 0)
-        every = len(some) == len(column)  # mostly of the first edge: there is nothing to take
-        column, here, least = (column, p, best) if every else (column[some], p.take(some, axis=1), best[some])
-        along, offset = ways.take(column, axis=1), here - starts.take(column, axis=1)
-        part = (along * offset).sum(axis=0) / lengths.take(column)
-        np.clip(part, 0, 1, out=part)
-        offset -= part * along
+        rows = np.flatnonzero(column >= 0)
+        candidate = column[rows]
+        direction, offset = directions.take(candidate, axis=1), p.take(rows, axis=1) - starts.take(candidate, axis=1)
+        share = (direction * offset).sum(axis=0) / squared_lengths.take(candidate)
+        np.clip(share, 0, 1, out=share)
+        offset -= share * direction
         squared = (offset * offset).sum(axis=0)
-        nearer = np.flatnonzero(squared < (1 - NEAREST_TIE) * least)  # a vertex has several: rounding must not choose
-        some = some[nearer]
-        edge[some], t[some], best[some] = column[nearer], part[nearer], squared[nearer]
+        nearer = np.flatnonzero(squared < (1 - NEAREST_TIE) * best[rows])  # a vertex has several: no rounding chooses
+        rows = rows[nearer]
+        edge[rows], t[rows], best[rows] = candidate[nearer], share[nearer], squared[nearer]
     return edge, t
 
 
 def places_on_edges(x: np.ndarray, edges: np.ndarray, edge: np.ndarray, t: np.ndarray) -> np.ndarray:
     """The places, (n, 3) float array, that `nearest_on_edges` names."""
-    start, way = x[edges[:, 0]], x[edges[:, 1]] - x[edges[:, 0]]
-    return start.take(edge, axis=0) + t[:, None] * way.take(edge, axis=0)
+    start, direction = x[edges[:, 0]], x[edges[:, 1]] - x[edges[:, 0]]
+    return start.take(edge, axis=0) + t[:, None] * direction.take(edge, axis=0)

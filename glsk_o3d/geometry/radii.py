@@ -27,8 +27,7 @@ def plane_distance_radii(
     """
     supporting = supporting_points(vertex_of_point, normals)
     vertex = vertex_of_point[supporting]
-    offset = points[supporting] - vertices[vertex]
-    distance = np.abs(dot(offset, normals[supporting]))
+    distance = np.abs(dot(points[supporting] - vertices[vertex], normals[supporting]))
     radii = group_median(distance, vertex, len(vertices))
     return np.where(np.bincount(vertex, minlength=len(vertices)) > 0, radii, otherwise)
 
@@ -41,17 +40,13 @@ def robust_radii(
     The distance to the planes is exact on tubes and cones, and on a flat part it is half its thickness. But noise tilts
     normals, and the plane of a tilted normal passes nearer than its point: radii come out small, most where parts are
     thin and where they meet. The `distance` (n,) of the points from the curve knows no normals. Its weight is
-
-    .. math:: \sqrt d (1 - \varphi)
-
-    with the `doubt` d (M,) of `fit_axis` and :math:`\varphi = |a - b|`, the difference of the shares a + b = 1 that the
-    two directions across the axis have of the squared normals: 0 around a tube, or half of one, and 1 on a sheet, where
-    the distance of the points would measure its width. Vertices without points keep their `planes` (M,).
+    :math:`\sqrt d (1 - \varphi)`, with the `doubt` d (M,) of `fit_axis` and :math:`\varphi = |a - b|`, the difference
+    of the shares a + b = 1 that the two directions across the axis have of the squared normals: 0 around a tube, or
+    half of one, and 1 on a sheet, where it would measure the width. Vertices without points keep their `planes` (M,).
     """
     m = len(planes)
     count = np.bincount(vertex, minlength=m)
     shares = group_sum(normals[:, ROWS] * normals[:, COLUMNS], vertex, m) / np.maximum(count, 1)[:, None]
-    # (a - b)^2 = 2 (a^2 + b^2) - 1
-    flat = np.sqrt(np.clip(2 * shares**2 @ TIMES - 1, 0, 1))
+    flat = np.sqrt(np.clip(2 * shares**2 @ TIMES - 1, 0, 1))  # (a - b)^2 = 2 (a^2 + b^2) - 1
     weight: Floats = np.where(count > 0, np.sqrt(doubt) * (1 - flat), 0)
     return (1 - weight) * planes + weight * group_median(distance, vertex, m)

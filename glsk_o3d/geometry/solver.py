@@ -26,22 +26,16 @@ def factorised(matrix: csc_array, ordered: bool = False, panel: int = NARROW_PAN
 
     Unknowns that are not `ordered` are eliminated in the order of the minimum degree.
     """
-    return splu(
-        matrix,
-        permc_spec="NATURAL" if ordered else "MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        relax=1,
-        panel_size=panel,
-        options={"SymmetricMode": True, **options},
-    )
+    order, options = "NATURAL" if ordered else "MMD_AT_PLUS_A", {"SymmetricMode": True, **options}
+    return splu(matrix, permc_spec=order, diag_pivot_thresh=0.0, relax=1, panel_size=panel, options=options)
 
 
 class Elimination:
     """The order in which unknowns are eliminated: kept from system to system as long as these have as many entries.
 
     To find it takes a third of the time of a factorisation. It suits the same links with other weights; where points
-    were merged, or where weights that were exactly 0 are no longer, as those of the right angles of a grid, what is
-    left of it makes ten times as many entries and more as one found anew.
+    were merged, or weights are no longer exactly 0, as those of the right angles of a grid, it makes ten times as many
+    entries and more as one found anew.
     """
 
     def __init__(self) -> None:
@@ -70,10 +64,9 @@ def solve_contraction(
 ) -> tuple[np.ndarray, float]:
     r"""Minimise :math:`\|W_L L X\|^2 + \|W_H (X - P)\|^2` (Wen et al. 2024, equation 3; Cao et al. 2010).
 
-    The normal equations :math:`(L^T W_L^2 L + W_H^2) X = W_H^2 P` are factorised once for the three coordinates, by
-    SuperLU in symmetric mode. They are ill-conditioned late in a contraction, so that the factorisation alone is wrong
-    in the second digit; iterative refinement with the residual in factored form, :math:`W_H^2 (P - X) - L^T W_L^2 (L
-    X)`, brings the correction below 1e-7 in one to three steps.
+    The normal equations :math:`(L^T W_L^2 L + W_H^2) X = W_H^2 P` are factorised once for the three coordinates. They
+    are ill-conditioned late in a contraction, so that this alone is wrong in the second digit; iterative refinement
+    with the residual in factored form, :math:`W_H^2 (P - X) - L^T W_L^2 (L X)`, brings the correction below 1e-7.
 
     The weights (n,) are the diagonals of :math:`W_L` and :math:`W_H`; `position_weight` must be positive. The order of
     the unknowns is kept in the `elimination`. Returns the places (n, 3) and the last correction over the cloud's size,
@@ -118,7 +111,7 @@ def _stacked(
     laplacian: csr_matrix, row_weight: np.ndarray, position_weight: np.ndarray, place: np.ndarray
 ) -> csr_array:
     """The rows of W_L L, and below them W_H; every unknown has its place among the columns."""
-    n, (indices, starts) = len(place), (laplacian.indices, laplacian.indptr)
+    n, indices, starts = len(place), laplacian.indices, laplacian.indptr
     data = np.concatenate([np.repeat(row_weight, np.diff(starts)) * laplacian.data, position_weight])
     columns = place.astype(indices.dtype)
     ends = starts[-1] + np.arange(1, n + 1, dtype=starts.dtype)

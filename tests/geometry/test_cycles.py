@@ -117,12 +117,12 @@ def test_bridges_and_twigs_are_on_no_cycle():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_candidates_are_simple_cycles_each_closed_once(seed, monkeypatch):
+def test_candidates_are_simple_cycles_each_candidates_once(seed, monkeypatch):
     rng = np.random.default_rng(seed)
     graph = weighted(nx.random_regular_graph(3, 24, seed=seed), rng, whole=seed % 2 == 1)
     asked = []
-    closed = cycles_module._closed
-    monkeypatch.setattr(cycles_module, "_closed", lambda *given: asked.append(given) or closed(*given))
+    closed = cycles_module._candidates
+    monkeypatch.setattr(cycles_module, "_candidates", lambda *given: asked.append(given) or closed(*given))
     _, lengths = basis_of(graph)
     (graph, _, high, ends, weights, shortest), cycles, before_total = asked[-1], [], 0.0
     for total, e, before, root in closed(graph, -np.inf, high, ends, weights, shortest):
@@ -144,8 +144,8 @@ def test_candidates_are_simple_cycles_each_closed_once(seed, monkeypatch):
 def test_slices_of_roots_and_lengths_give_one_basis(seed, monkeypatch):
     """A ladder with one long way around: the last cycle of its basis is longer than any other."""
     graph = weighted(nx.circular_ladder_graph(40), np.random.default_rng(seed), whole=seed % 2 == 1)
-    asked, closed = [], cycles_module._closed
-    monkeypatch.setattr(cycles_module, "_closed", lambda *given: asked.append(given) or closed(*given))
+    asked, closed = [], cycles_module._candidates
+    monkeypatch.setattr(cycles_module, "_candidates", lambda *given: asked.append(given) or closed(*given))
     cycles, total = basis_of(graph)
     assert len(asked) > 2
     np.testing.assert_allclose(total, expected(graph))

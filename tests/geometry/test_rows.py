@@ -6,7 +6,7 @@ from scipy.spatial import cKDTree
 
 from glsk_o3d import RingBuilder, Sampler, samples, skeletonize
 from glsk_o3d.data.points import default_k
-from glsk_o3d.geometry.rows import reach_next_rows
+from glsk_o3d.geometry.neighbourhoods import reach_next_rows
 
 RADIUS = 0.3
 

@@ -14,7 +14,7 @@ from ...analysis.comparison import matched
 from ...analysis.curves import along, pieces, simple_edges
 from ...data.skeleton import Skeleton
 from ...geometry.groups import component_labels
-from ...geometry.paths import maximal_paths
+from ...geometry.polylines import maximal_paths
 from ...geometry.vectors import dot, norm
 from .tiles import CUT_REACH, Grid, Tile
 

@@ -29,10 +29,10 @@ AGREES, IN_PART, DISTRUST, UNTOLD = VERDICTS = "agrees", "agrees in part", "do n
 
 @dataclass(frozen=True)
 class MeshFacts:
-    """How a mesh fits a cloud: shares of the points that it passes by, and where its normals are others; its faults."""
+    """How a mesh fits a cloud."""
 
-    uncovered: float
-    tilted: float
+    uncovered: float  # share of the points that it passes by
+    tilted: float  # and where its normals are others
     faults: tuple[str, ...]
 
 
@@ -40,8 +40,8 @@ def mesh_facts(solid: Solid, points: np.ndarray, normals: np.ndarray, components
     """How a mesh fits points (n, 3) with normals (n, 3) up to their sign, whose skeleton has so many components."""
     igl, mesh = require("igl"), (solid.vertices, solid.faces)
     squared, face, _ = igl.point_mesh_squared_distance(points, *mesh)
-    along = dot(igl.per_face_normals(*mesh, np.zeros(3))[face], normals)
-    shares = float((squared > (COVERED * spacing(points)) ** 2).mean()), float((np.abs(along) < ALIGNED).mean())
+    cosine = dot(igl.per_face_normals(*mesh, np.zeros(3))[face], normals)
+    shares = float((squared > (COVERED * spacing(points)) ** 2).mean()), float((np.abs(cosine) < ALIGNED).mean())
     return MeshFacts(*shares, of_mesh(solid, components, *shares, stop_reason))
 
 
@@ -56,23 +56,22 @@ def judge(
     doubt, trusted = {"doubt": skeletons.doubt}, float(not mesh.faults)
     facts = dict(operators=bool(operators), solid=bool(counts), limbs=float(np.log1p(len(limbs))))
     probability = logistic(WEIGHTS, {name: trusted * fact for name, fact in facts.items()} | doubt)
-    folded = _wrong((rows.folded > 0, f"rings that do not go once around their point: {rows.folded}"))
+    folded = _reasons((rows.folded > 0, f"rings that do not go once around their point: {rows.folded}"))
     reasons = [*folded, *mesh.faults, *operators, *counts, *limbs]
     if skeletons.closest_call and logistic(WEIGHTS, dict.fromkeys(facts, 0.0) | doubt) < CERTAIN:
         reasons.append(f"whether the branch at ({coordinates(skeletons.closest_call)}) is a limb is a close call")
     differs = bool(operators or counts or limbs)
-    both = len({*skeletons.components}) == 1 == len({*skeletons.loops})
-    if mesh.faults and (differs or not both or mesh.uncovered > ELSEWHERE_SHARE):
+    same = len({*skeletons.components}) == 1 == len({*skeletons.loops})
+    verdict = DISTRUST if probability < LIKELY else IN_PART if differs or probability < CERTAIN else AGREES
+    if mesh.faults and (differs or not same or mesh.uncovered > ELSEWHERE_SHARE):
         verdict = UNTOLD
-    else:
-        verdict = DISTRUST if probability < LIKELY else IN_PART if differs or probability < CERTAIN else AGREES
     return DISTRUST if folded else verdict, probability, tuple(reasons)
 
 
 def of_mesh(solid: Solid, components: int, uncovered: float, tilted: float, stop_reason: str) -> tuple[str, ...]:
     """What is wrong with a mesh; `stop_reason` is that of its contraction."""
     torn = solid.n_solids > components and (solid.made_by == "given" or not solid.is_watertight)
-    return _wrong(
+    return _reasons(
         (REFUSED in stop_reason, f"the mesh's own contraction failed: {stop_reason}"),
         (torn, f"the mesh is in {solid.n_solids} parts"),
         (uncovered > UNCOVERED_SHARE, f"the mesh is not where {uncovered:.0%} of the points are"),
@@ -84,11 +83,10 @@ def of_mesh(solid: Solid, components: int, uncovered: float, tilted: float, stop
 def of_operators(rows: OperatorAgreement) -> tuple[str, ...]:
     """How two operators differ."""
     angles, length, eigenvalues = rows.angle, rows.ratio.get("median", 1.0), rows.eigenvalue_ratio
-    turned = {name: angles.get(name, 0.0) for name in ("median", "p90")}
-    vectors = "of the mean curvature vectors are turned by more than"
-    return _wrong(
-        (turned["median"] > TURNED, f"half {vectors} {turned['median']:.0f} degrees"),
-        (turned["p90"] > MOST_TURNED, f"a tenth {vectors} {turned['p90']:.0f} degrees"),
+    half, tenth = angles.get("median", 0.0), angles.get("p90", 0.0)
+    return _reasons(
+        (half > TURNED, f"half of the mean curvature vectors are turned by more than {half:.0f} degrees"),
+        (tenth > MOST_TURNED, f"a tenth of the mean curvature vectors are turned by more than {tenth:.0f} degrees"),
         (not 1 / RATIO < length < RATIO, f"the mean curvature vectors are {length:.3g} times as long as the mesh's"),
         (not 1 / RATIO < eigenvalues < RATIO, f"the eigenvalues are {eigenvalues:.3g} times those of the mesh"),
         (not rows.functions < MAPPED, f"smooth functions are mapped differently, by {rows.functions:.0%}"),
@@ -97,19 +95,19 @@ def of_operators(rows: OperatorAgreement) -> tuple[str, ...]:
 
 def of_counts(skeletons: SkeletonAgreement, solid: Solid) -> tuple[str, ...]:
     """What the solid has more or less of than the cloud's skeleton; one that is open may have a handle cut open."""
-    (parts, their_parts), (loops, their_loops) = skeletons.components, skeletons.loops
-    told, closed = "{}: {} in the skeleton, {} in the mesh".format, solid.is_watertight
-    return _wrong(
-        (parts != solid.n_solids and (closed or parts != their_parts), told("components", parts, solid.n_solids)),
-        (loops != solid.genus and (closed or loops != their_loops), told("loops", loops, solid.genus)),
+    counts = ("components", skeletons.components, solid.n_solids), ("loops", skeletons.loops, solid.genus)
+    return tuple(
+        f"{name}: {ours} in the skeleton, {right} in the mesh"
+        for name, (ours, theirs), right in counts
+        if ours != right and (solid.is_watertight or ours != theirs)
     )
 
 
 def of_limbs(skeletons: SkeletonAgreement) -> list[str]:
     """Ends that one skeleton has and the other lacks."""
-    found = [f"the mesh's skeleton ends at ({coordinates(at)}), the cloud's does not" for at in skeletons.missing]
-    return found + [f"the skeleton ends at ({coordinates(at)}), the mesh's does not" for at in skeletons.extra]
+    missing = [f"the mesh's skeleton ends at ({coordinates(at)}), the cloud's does not" for at in skeletons.missing]
+    return missing + [f"the skeleton ends at ({coordinates(at)}), the mesh's does not" for at in skeletons.extra]
 
 
-def _wrong(*told: tuple[bool, str]) -> tuple[str, ...]:
-    return tuple(text for wrong, text in told if wrong)
+def _reasons(*facts: tuple[bool, str]) -> tuple[str, ...]:
+    return tuple(text for holds, text in facts if holds)

@@ -14,9 +14,9 @@ from ...errors import InvalidCloudError, InvalidParameterError
 from ...filters.contractor import Contractor
 from ...filters.ring_builder import RingBuilder
 from ...filters.thinner import Thinner
+from ...geometry.cotangent import Operator, ring_operator
 from ...geometry.inscribed_balls import outward_normals
 from ...geometry.neighbourhoods import spacing
-from ...geometry.operators import Operator, ring_operator
 from ...geometry.vectors import box
 from ...interop.clouds import SurfaceMesh, surface_mesh
 from ...interop.packages import require
@@ -44,12 +44,11 @@ class CrossCheck:
     reasons : tuple of str
         What speaks against it, with the places.
     rows, skeletons, mesh : OperatorAgreement, SkeletonAgreement, MeshFacts
-        The numbers that `to_dict` lists.
     points : (N, 3) float64 array
         The input points, in the user's order and units, as are the skeletons and the solid.
     angle : (N,) float64 array
-        Between the mean curvature vectors of cloud and mesh, in degrees, of the contracted point that represents each;
-        NaN where the mesh is too far away, 0 where both are flat.
+        Between the mean curvature vectors of cloud and mesh, in degrees; NaN where the mesh is too far away, 0 where
+        both are flat.
     skeleton, mesh_skeleton, solid : Skeleton, Skeleton, Solid
     ours, theirs : Operator
         The Laplacians of the contracted points and of the mesh, in the working frame.
@@ -99,9 +98,9 @@ def cross_check(cloud: Any, *, pipeline: Pipeline[Any, Any] | str = "default", m
     pipeline : Pipeline or str
         ... | RingBuilder | Contractor | ... | Refiner; the mesh's has the same parameters but no reduction.
     mesh : {"auto", "poisson", "ball_pivoting"}, TriangleMesh, or (vertices, faces)
-        "poisson" reconstructs a mesh with vertices of its own, "ball_pivoting" one with the cloud's points as vertices,
-        which tests the code more than the method. "auto" takes the triangles of `cloud` if it has some that are not too
-        coarse, else "poisson". One of the user's is in the cloud's units.
+        "poisson" reconstructs a mesh with vertices of its own, "ball_pivoting" one with the cloud's points as vertices;
+        "auto" takes the triangles of `cloud` if it has some that are not too coarse, else "poisson". One of the user's
+        is in the cloud's units.
 
     Returns
     -------
@@ -114,7 +113,6 @@ def cross_check(cloud: Any, *, pipeline: Pipeline[Any, Any] | str = "default", m
     InvalidParameterError
         The pipeline or the mesh is wrong, or the mesh is too coarse.
     MissingPackageError
-        libigl or Open3D is not installed.
 
     Examples
     --------
@@ -132,51 +130,54 @@ def cross_check(cloud: Any, *, pipeline: Pipeline[Any, Any] | str = "default", m
     require("igl")  # before the work that it is for
     rings = kinds.index(RingBuilder)
     builder: Any = pipeline.stages[rings]
-    first = kinds.index(Thinner) if Thinner in kinds[:rings] else rings
-    every = Pipeline(*pipeline.stages[:first])(cloud) if first else cloud
-    every = every if isinstance(every, Points) else Points.of(every)
-    points: Points = Pipeline(*pipeline.stages[first:rings])(every) if first < rings else every
+    thinner = kinds.index(Thinner) if Thinner in kinds[:rings] else rings
+    dense = Pipeline(*pipeline.stages[:thinner])(cloud) if thinner else cloud
+    dense = dense if isinstance(dense, Points) else Points.of(dense)
+    points: Points = Pipeline(*pipeline.stages[thinner:rings])(dense) if thinner < rings else dense
     state: Contraction = builder(points)
     skeleton: Skeleton = Pipeline(*pipeline.stages[rings + 1 :])(state)
 
-    ours = ring_operator(state.positions, state.rings)
+    ours, frame = ring_operator(state.positions, state.rings), state.frame
     if not ours.area.sum() > LEAST_SURFACE:
         raise InvalidCloudError("the points lie on a line: there is no surface to compare with")
-    dense = state if points is every else builder(every)
-    frame, body = state.frame, _body(cloud, mesh, dense, spacing(state.positions))
-    theirs = operators.mesh_operator(body)
-    of_rings = state.rings, builder.neighbourhoods(points, ours.places)[1]
-    angle, rows = operators.compare_operators(ours, *of_rings, theirs, body)
-    whole = replace(body, vertices=frame.out_of(body.vertices))
-    other = mesh_skeleton(whole, pipeline)
-    at_all = dense.positions, dense.normals[dense.survivors]
-    facts = agreement.mesh_facts(body, *at_all, skeleton.n_components, other.report.stop_reason)
+    surface = state if points is dense else builder(dense)
+    solid = _solid(cloud, mesh, surface, spacing(state.positions))
+    theirs = operators.mesh_operator(solid)
+    ring_normals = builder.neighbourhoods(points, ours.places)[1]
+    angle, rows = operators.compare_operators(ours, state.rings, ring_normals, theirs, solid)
+    in_units = replace(solid, vertices=frame.out_of(solid.vertices))
+    other = mesh_skeleton(in_units, pipeline)
+    at_surface = surface.positions, surface.normals[surface.survivors]
+    facts = agreement.mesh_facts(solid, *at_surface, skeleton.n_components, other.report.stop_reason)
     skeletons = compare_skeletons(skeleton, other, COMPARISON_STEP * frame.diagonal * frame.scale)
-    said = agreement.judge(rows, skeletons, body, facts)
-    of_points = state.points, np.append(angle, np.nan)[state.survivor_of_point]
-    return CrossCheck(*said, rows, skeletons, facts, *of_points, skeleton, other, whole, ours, theirs)
+    judgement = agreement.judge(rows, skeletons, solid, facts)
+    angle = np.append(angle, np.nan)[state.survivor_of_point]
+    return CrossCheck(*judgement, rows, skeletons, facts, state.points, angle, skeleton, other, in_units, ours, theirs)
 
 
-def _body(cloud: Any, mesh: Any, dense: Contraction, apart: float) -> Solid:
-    """The mesh that is asked for, in the working frame; contracted points are so far apart."""
-    own = None
+def _solid(cloud: Any, mesh: Any, surface: Contraction, edge: float) -> Solid:
+    """The mesh that is asked for, in the working frame; contracted points are one `edge` apart."""
     if not isinstance(mesh, str):
-        if isinstance(mesh, tuple) and (len(mesh) != 2 or np.shape(mesh[1])[1:] != (3,)):
-            raise InvalidParameterError("mesh: must be vertices (V, 3) and faces (F, 3), or a triangle mesh")
-        mesh = surface_mesh(SurfaceMesh(*mesh) if isinstance(mesh, tuple) else mesh)
-        (low, high), (least, most) = box(dense.positions), box(dense.frame.into(mesh.vertices))
-        size, reach = (high - low).max(), np.maximum(low - least, most - high).max()
-        if len(mesh.triangles) and not (reach < size and (most - least).max() > size / 2):
-            raise InvalidParameterError(
-                "mesh: is larger or smaller than the cloud, or elsewhere: same units and place?"
-            )
-        own = given(mesh, dense.frame, apart)
-        if own is None:
-            why = f"it has no triangles, or edges too long for points {apart * dense.frame.scale:.3g} apart"
-            raise InvalidParameterError(f"mesh: {why}: remesh it, as by MeshLab's 'Isotropic Explicit Remeshing'")
-    elif mesh == "auto" and np.isfinite(surface_mesh(cloud).vertices).all():
-        own = given(cloud, dense.frame, apart)
-    if own is not None:
-        return own
-    through = dense.positions, outward_normals(dense.positions, dense.normals[dense.survivors], dense.rings)
-    return ball_pivoting(*through) if mesh == "ball_pivoting" else poisson(*through, apart)
+        return _users_solid(mesh, surface, edge)
+    own = surface_mesh(cloud) if mesh == "auto" else None
+    solid = given(own, surface.frame, edge) if own and np.isfinite(own.vertices).all() else None
+    if solid is not None:
+        return solid
+    through = surface.positions, outward_normals(surface.positions, surface.normals[surface.survivors], surface.rings)
+    return ball_pivoting(*through) if mesh == "ball_pivoting" else poisson(*through, edge)
+
+
+def _users_solid(mesh: Any, surface: Contraction, edge: float) -> Solid:
+    """The mesh that is given, refused where it is of something else or too coarse."""
+    if isinstance(mesh, tuple) and (len(mesh) != 2 or np.shape(mesh[1])[1:] != (3,)):
+        raise InvalidParameterError("mesh: must be vertices (V, 3) and faces (F, 3), or a triangle mesh")
+    mesh, frame = surface_mesh(SurfaceMesh(*mesh) if isinstance(mesh, tuple) else mesh), surface.frame
+    (low, high), (least, most) = box(surface.positions), box(frame.into(mesh.vertices))
+    size, excess = (high - low).max(), np.maximum(low - least, most - high).max()
+    if len(mesh.triangles) and not (excess < size and (most - least).max() > size / 2):
+        raise InvalidParameterError("mesh: is larger or smaller than the cloud, or elsewhere: same units and place?")
+    solid = given(mesh, frame, edge)
+    if solid is None:
+        why = f"it has no triangles, or edges too long for points {edge * frame.scale:.3g} apart"
+        raise InvalidParameterError(f"mesh: {why}: remesh it, as by MeshLab's 'Isotropic Explicit Remeshing'")
+    return solid

@@ -30,8 +30,7 @@ LEAST_MASS = 0.05  # fitted: of the mean, that a vertex of slivers has
 def mesh_skeleton(solid: Solid, pipeline: Pipeline[Any, Any]) -> Skeleton:
     """Skeleton of a mesh, contracted from its medial places by libigl's Laplacian (Au et al. 2008; Tagliasacchi 2012).
 
-    The pipeline's Contractor and later filters lend their parameters; reductions are left out, and gaps of the mesh
-    stay gaps. Warnings are in the report alone.
+    The pipeline's Contractor and later filters lend their parameters, but there are no reductions, bridges or warnings.
     """
     stages: list[Any] = list(dropwhile(lambda stage: not isinstance(stage, Contractor), pipeline.stages))
     contractor = replace(stages[0], reducer=None)

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.sparse.linalg import eigs, eigsh
 
 from ...analysis.agreement import OperatorAgreement
-from ...geometry.operators import Operator, eigenvalues, mapped
+from ...geometry.cotangent import Operator, eigenvalues, mapped
 from ...geometry.rings import Rings
 from ...geometry.vectors import TINY, box, dot, norm
 from ...interop.packages import require
@@ -25,18 +25,17 @@ def mesh_operator(solid: Solid) -> Operator:
 def compare_operators(
     ours: Operator, rings: Rings, ring_normals: np.ndarray, theirs: Operator, solid: Solid
 ) -> tuple[np.ndarray, OperatorAgreement]:
-    """Compare the operators of a cloud and a mesh.
+    """The angle between the mean curvature vectors of cloud and mesh at every point, in degrees, and how they agree.
 
-    Gives the angle between the mean curvature vectors at every point of the cloud in degrees, (n,) float array, 0 where
-    both are flat and NaN where the mesh is too far away, and an OperatorAgreement.
+    The (n,) float array is 0 where both are flat and NaN where the mesh is too far away.
     """
     igl, (low, high) = require("igl"), box(theirs.places)
     edge = float(rings.mean_lengths(ours.places).mean())
     length = DIFFUSION * edge
-    phases = (np.pi * (each.places - low) / np.maximum(high - low, TINY) for each in (ours, theirs))
-    functions = [np.cos(np.column_stack([phase, 2 * phase])) for phase in phases]  # half a wave and a whole one across
-    mine = mapped(ours, np.column_stack([ours.places, functions[0]]), length)
-    other = mapped(theirs, np.column_stack([theirs.places, functions[1]]), length)
+    phases = (np.pi * (operator.places - low) / np.maximum(high - low, TINY) for operator in (ours, theirs))
+    waves = [np.cos(np.column_stack([phase, 2 * phase])) for phase in phases]  # half a wave and a whole one across
+    mine = mapped(ours, np.column_stack([ours.places, waves[0]]), length)
+    other = mapped(theirs, np.column_stack([theirs.places, waves[1]]), length)
     squared, face, foot = igl.point_mesh_squared_distance(ours.places, solid.vertices, solid.faces)
     corners = solid.faces[face]
     share = igl.barycentric_coordinates(foot, *(solid.vertices[corner] for corner in corners.T))
@@ -47,22 +46,21 @@ def compare_operators(
     bent = near & ~flat
     cosine = dot(mine[:, :3], other[:, :3]) / np.maximum(a * b, TINY)
     angle = np.where(flat, 0, np.where(near, np.degrees(np.arccos(np.clip(cosine, -1, 1))), np.nan))
-    apart, size = (ours.area[near] @ square[near, 3:] ** 2 for square in (mine - other, other))
-    values = [eigenvalues(ours, eigs), eigenvalues(theirs, eigsh)]
-    both = np.column_stack([each[: min(map(len, values))] for each in values])
-    telling = both[(both[:, 1] * theirs.area.sum() > 1)]
-    found = OperatorAgreement(
+    difference, size = (ours.area[near] @ vectors[near, 3:] ** 2 for vectors in (mine - other, other))
+    both = np.array([*zip(eigenvalues(ours, eigs), eigenvalues(theirs, eigsh), strict=False)])
+    positive = both[both[:, 1] * theirs.area.sum() > 1]
+    agreement = OperatorAgreement(
         points=len(a),
         compared=int(near.sum()),
         flat=int(flat.sum()),
         angle=_quantiles(angle[bent]),
         ratio=_quantiles(a[bent] / np.maximum(b[bent], TINY)),
-        functions=float(np.median(np.sqrt(apart / np.maximum(size, TINY)))),
+        functions=float(np.median(np.sqrt(difference / np.maximum(size, TINY)))),
         eigenvalues=both,
-        eigenvalue_ratio=float(np.median(telling[:, 0] / telling[:, 1])),
+        eigenvalue_ratio=float(np.median(positive[:, 0] / positive[:, 1])),
         folded=int(rings.folded(ours.places, ring_normals).sum()),
     )
-    return angle, found
+    return angle, agreement
 
 
 def _quantiles(values: np.ndarray) -> dict[str, float]:

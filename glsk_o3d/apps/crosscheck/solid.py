@@ -1,5 +1,7 @@
 """The solid whose surface a cloud is: a mesh of its own, and what it is like."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -10,7 +12,7 @@ from scipy.spatial import cKDTree
 from ...errors import InvalidCloudError
 from ...geometry.frame import MIN_POINTS, Frame
 from ...geometry.neighbourhoods import spacing
-from ...interop.clouds import surface_mesh, to_point_cloud
+from ...interop.clouds import SurfaceMesh, to_point_cloud
 from ...interop.packages import import_open3d, require
 
 CELL = 1.25  # measured: side of the octree's cells, in spacings: smaller ones follow noise, larger ones close holes
@@ -26,10 +28,10 @@ MOST_VERTICES = 50_000  # speed: of a given mesh whose edges were halved
 
 
 class Part(NamedTuple):
-    """A connected part of a mesh; `volume` is None of one with borders."""
+    """A connected part of a mesh."""
 
     area: float
-    volume: float | None
+    volume: float | None  # None if it has borders
     genus: int
     borders: int
 
@@ -41,35 +43,24 @@ class Part(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A mesh that a cloud is checked against.
+    """A mesh that a cloud is checked against."""
 
-    Attributes
-    ----------
-    vertices : (V, 3) float64 array
-    faces : (F, 3) int64 array
-        Anticlockwise from outside; a manifold.
-    made_by : {"poisson", "ball_pivoting", "given"}
-    """
-
-    vertices: np.ndarray
-    faces: np.ndarray
-    made_by: str
+    vertices: np.ndarray  # (V, 3) float64
+    faces: np.ndarray  # (F, 3) int64, anticlockwise from outside; a manifold
+    made_by: str  # "poisson", "ball_pivoting" or "given"
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:
         """The connected parts, the largest area first."""
-        n_parts, part_of_face = require("igl").facet_components(self.faces)
-        parts = (self._part(self.faces[part_of_face == part]) for part in range(n_parts))
+        igl, parts = require("igl"), []
+        n_parts, part_of_face = igl.facet_components(self.faces)
+        for part in range(n_parts):
+            vertices, faces, *_ = igl.remove_unreferenced(self.vertices, self.faces[part_of_face == part])
+            area, borders = float(igl.doublearea(vertices, faces).sum() / 2), len(igl.boundary_loop_all(faces))
+            corners = vertices[faces] - vertices.mean(axis=0)
+            volume = None if borders else float(np.linalg.det(corners).sum() / 6)
+            parts.append(Part(area, volume, (2 - borders - int(igl.euler_characteristic(faces))) // 2, borders))
         return tuple(sorted(parts, key=lambda part: -part.area))
-
-    def _part(self, faces: np.ndarray) -> Part:
-        igl = require("igl")
-        vertices, faces, *_ = igl.remove_unreferenced(self.vertices, faces)
-        area = float(igl.doublearea(vertices, faces).sum() / 2)
-        borders = len(igl.boundary_loop_all(faces))
-        corners = vertices[faces] - vertices.mean(axis=0)
-        volume = None if borders else float(np.linalg.det(corners).sum() / 6)
-        return Part(area, volume, (2 - borders - int(igl.euler_characteristic(faces))) // 2, borders)
 
     @property
     def is_watertight(self) -> bool:
@@ -87,8 +78,8 @@ class Solid:
         return sum(part.genus for part in self.parts if not part.is_cavity)
 
     @classmethod
-    def of(cls, mesh: Any, made_by: str) -> "Solid":
-        """One of an Open3D mesh, split where it is no manifold; InvalidCloudError if there is hardly any surface."""
+    def of(cls, mesh: Any, made_by: str, *, orient: bool = False, least_part: float = 0.0) -> Solid:
+        """That of an Open3D mesh, split where it is no manifold; InvalidCloudError if there is hardly any surface."""
         igl = require("igl")
         mesh.remove_duplicated_vertices()
         mesh.remove_duplicated_triangles()
@@ -97,30 +88,27 @@ class Solid:
         faces = faces[area > SLIVER * area.mean()] if len(faces) else faces
         if len(faces) < MIN_POINTS:
             raise InvalidCloudError(f"only {len(faces)} triangles have an area: there is no surface to compare with")
-        faces = igl.bfs_orient(faces)[0] if made_by == "given" else faces
-        vertices, faces, *_ = igl.split_nonmanifold(vertices, faces)
+        vertices, faces, *_ = igl.split_nonmanifold(vertices, igl.bfs_orient(faces)[0] if orient else faces)
         part = igl.facet_components(faces)[1]
         area = np.bincount(part, igl.doublearea(vertices, faces))
-        large = (area >= (LEAST_PART * area.max() if made_by == "poisson" else 0))[part]
-        vertices, faces, *_ = igl.remove_unreferenced(vertices, faces[large])
-        solid = cls(vertices, faces, made_by)
-        inside_out = next((part.is_cavity for part in solid.parts if not part.borders), False)
-        return cls(vertices, faces[:, ::-1].copy(), made_by) if inside_out else solid
+        vertices, faces, *_ = igl.remove_unreferenced(vertices, faces[(area >= least_part * area.max())[part]])
+        inside_out = next((part.is_cavity for part in cls(vertices, faces, made_by).parts if not part.borders), False)
+        return cls(vertices, faces[:, ::-1].copy() if inside_out else faces, made_by)
 
 
-def poisson(points: np.ndarray, outward: np.ndarray, apart: float) -> Solid:
+def poisson(points: np.ndarray, outward: np.ndarray, edge: float) -> Solid:
     """A mesh through points (n, 3) with outward normals, with vertices of its own (Kazhdan and Hoppe 2013).
 
-    `apart` is the spacing that its cells go by. What is far from all points is left out, and so are small parts.
+    `edge` is the spacing that its cells go by. What is far from all points is left out, and so are small parts.
     """
-    o3d, cloud, cell = import_open3d(), to_point_cloud(points), CELL * apart
+    o3d, cloud, cell = import_open3d(), to_point_cloud(points), CELL * edge
     if cell > np.ptp(points, axis=0).max() / LEAST_CELLS:
         raise InvalidCloudError(f"{len(points)} points are too few for a surface to be reconstructed")
     cloud.normals = o3d.utility.Vector3dVector(outward)
-    asked = dict(depth=0, width=cell, full_depth=FULL_DEPTH, linear_fit=True, n_threads=1)
-    mesh, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, **asked)
+    octree = dict(depth=0, width=cell, full_depth=FULL_DEPTH, linear_fit=True, n_threads=1)
+    mesh, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, **octree)
     mesh.remove_vertices_by_mask(cKDTree(points).query(np.asarray(mesh.vertices))[0] > REACH * cell)
-    return Solid.of(mesh, "poisson")
+    return Solid.of(mesh, "poisson", least_part=LEAST_PART)
 
 
 def ball_pivoting(points: np.ndarray, outward: np.ndarray) -> Solid:
@@ -131,26 +119,25 @@ def ball_pivoting(points: np.ndarray, outward: np.ndarray) -> Solid:
     return Solid.of(o3d.geometry.TriangleMesh.create_from_point_cloud_ball_pivoting(cloud, radii), "ball_pivoting")
 
 
-def given(mesh: Any, frame: Frame, apart: float) -> Solid | None:
+def given(surface: SurfaceMesh, frame: Frame, edge: float) -> Solid | None:
     """A mesh of the user's in the working frame, simplified if much finer than the points, its edges halved if coarser.
 
-    None if that makes too many, or if it has no triangles; InvalidCloudError if it is no mesh.
+    None if that makes too many, or if it has no triangles; InvalidCloudError if it is not finite or has no area.
     """
-    vertices, triangles = surface_mesh(mesh)
-    if len(triangles) == 0:
+    if len(surface.triangles) == 0:
         return None
-    if not np.isfinite(vertices).all():
+    if not np.isfinite(surface.vertices).all():
         raise InvalidCloudError("the mesh has coordinates that are not finite")
     o3d, igl = import_open3d(), require("igl")
-    arrays = o3d.utility.Vector3dVector(frame.into(vertices)), o3d.utility.Vector3iVector(triangles)
-    mesh = o3d.geometry.TriangleMesh(*arrays)
-    enough = int(TRIANGLES * mesh.get_surface_area() / apart**2)
-    if len(triangles) > MOST_TIMES * enough:
-        return Solid.of(mesh.simplify_quadric_decimation(enough), "given")
-    solid = Solid.of(mesh, "given")
-    while igl.edge_lengths(solid.vertices, solid.faces).max() > LONGEST_EDGE * apart:
+    vertices = o3d.utility.Vector3dVector(frame.into(surface.vertices))
+    mesh = o3d.geometry.TriangleMesh(vertices, o3d.utility.Vector3iVector(surface.triangles))
+    enough = int(TRIANGLES * mesh.get_surface_area() / edge**2)
+    if len(surface.triangles) > MOST_TIMES * enough:
+        return Solid.of(mesh.simplify_quadric_decimation(enough), "given", orient=True)
+    solid = Solid.of(mesh, "given", orient=True)
+    while igl.edge_lengths(solid.vertices, solid.faces).max() > LONGEST_EDGE * edge:
         if len(solid.vertices) > MOST_VERTICES / 4:
             return None
-        vertices, triangles = igl.upsample(solid.vertices, solid.faces, 1)
-        solid = Solid(vertices, triangles, "given")
+        vertices, faces = igl.upsample(solid.vertices, solid.faces, 1)
+        solid = Solid(vertices, faces, "given")
     return solid

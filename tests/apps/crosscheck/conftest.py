@@ -12,7 +12,7 @@ from glsk_o3d.apps.crosscheck import cross_check
 from glsk_o3d.apps.crosscheck.agreement import judge
 from glsk_o3d.apps.crosscheck.operators import compare_operators, mesh_operator
 from glsk_o3d.apps.crosscheck.solid import Solid
-from glsk_o3d.geometry.operators import ring_operator
+from glsk_o3d.geometry.cotangent import ring_operator
 
 
 @pytest.fixture(scope="session")

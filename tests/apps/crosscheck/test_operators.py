@@ -12,7 +12,7 @@ from glsk_o3d import RingBuilder, Sampler, pipelines, samples
 from glsk_o3d.apps.crosscheck import cross_check
 from glsk_o3d.apps.crosscheck.operators import compare_operators, mesh_operator
 from glsk_o3d.apps.crosscheck.solid import Solid
-from glsk_o3d.geometry.operators import Operator, eigenvalues, mapped, ring_operator
+from glsk_o3d.geometry.cotangent import Operator, eigenvalues, mapped, ring_operator
 
 SPHERE = np.repeat([4 * i * (i + 1) for i in range(8)], [2 * i + 1 for i in range(8)])[:50]  # of radius 1/2
 WAVES = np.array([[i, j] for i in range(-9, 10) for j in range(-9, 10)])

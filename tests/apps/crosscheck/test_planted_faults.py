@@ -9,7 +9,7 @@ from glsk_o3d import editing
 from glsk_o3d.analysis.agreement import compare_skeletons
 from glsk_o3d.apps.crosscheck.agreement import judge
 from glsk_o3d.data.skeleton import Skeleton
-from glsk_o3d.geometry.operators import ring_operator
+from glsk_o3d.geometry.cotangent import ring_operator
 from glsk_o3d.geometry.rings import Rings
 
 

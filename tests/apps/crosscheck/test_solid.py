@@ -10,7 +10,7 @@ from glsk_o3d.errors import InvalidCloudError
 from glsk_o3d.geometry.frame import Frame
 from glsk_o3d.geometry.inscribed_balls import outward_normals
 from glsk_o3d.geometry.neighbourhoods import spacing
-from glsk_o3d.interop.clouds import SurfaceMesh
+from glsk_o3d.interop.clouds import SurfaceMesh, surface_mesh
 from glsk_o3d.samples import torus, tube, two_rings
 
 UNIT = Frame(np.zeros(3), 1.0, np.ones(3), 1.0)
@@ -86,7 +86,7 @@ def test_long_edges_are_halved_and_the_surface_stays():
 def test_what_would_take_too_many_is_not_taken():
     box = triangles(o3d.geometry.TriangleMesh.create_box(1, 1, 4))
     assert given(SurfaceMesh(*box), UNIT, 0.001) is None
-    assert given(np.eye(3), UNIT, 0.1) is None  # a cloud
+    assert given(surface_mesh(np.eye(3)), UNIT, 0.1) is None  # a cloud
 
 
 def test_two_tetrahedra_that_share_an_edge_or_a_corner_are_two_parts():
@@ -106,7 +106,7 @@ def test_meshes_that_are_wrong():
         (vertices * [1, 0, 0], faces),
     ):
         with pytest.raises(InvalidCloudError):
-            given(SurfaceMesh(*wrong), UNIT, 0.1)
+            given(surface_mesh(SurfaceMesh(*wrong)), UNIT, 0.1)
 
 
 @pytest.mark.parametrize("spoil", ["corners apart", "inside out", "every other face turned"])
