@@ -1,7 +1,10 @@
 """Functions that prune, simplify and reroot a skeleton, and turn its detail. Each returns a new one."""
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import replace
+from functools import wraps
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from scipy.sparse.csgraph import minimum_spanning_tree
@@ -11,7 +14,7 @@ from .curve.detail import with_limbs
 from .curve.merging import merge_into
 from .curve.rooted import RootPlace, numbered_from, root_among
 from .data.graph import all_of_vertices
-from .data.skeleton import Skeleton, of_input
+from .data.skeleton import Skeleton, check_skeleton, of_input
 from .errors import InvalidParameterError
 from .geometry.near_links import linked
 from .geometry.polylines import arc_lengths
@@ -20,7 +23,21 @@ from .parameters import check_number
 
 __all__ = ["cut_loops", "detailed", "largest_component", "prune", "reroot", "simplify"]
 
+Edit = TypeVar("Edit", bound=Callable[..., Skeleton])
 
+
+def _with_all_points(edit: Edit) -> Edit:
+    """The same edit with the points by area that stand for a mesh, which a user does not see."""
+
+    @wraps(edit)
+    def edited(skeleton: Skeleton, *args: Any, **options: Any) -> Skeleton:
+        check_skeleton(skeleton)
+        return of_input(edit(skeleton.whole, *args, **options))
+
+    return cast(Edit, edited)
+
+
+@_with_all_points
 def largest_component(skeleton: Skeleton) -> Skeleton:
     """The connected component with the greatest length.
 
@@ -35,24 +52,21 @@ def largest_component(skeleton: Skeleton) -> Skeleton:
 
     Examples
     --------
-    >>> from glsk_o3d import skeletonize
-    >>> from glsk_o3d.samples import two_rings
-    >>> largest_component(skeletonize(two_rings(3000).points)).n_components
+    >>> from glsk_o3d import samples, skeletonize
+    >>> largest_component(skeletonize(samples.two_rings(3000).points)).n_components
     1
     """
     if skeleton.n_components < 2:
         return skeleton
-    skeleton, part = skeleton.whole, skeleton.component_of_vertex
-    length = np.bincount(part[skeleton.edges[:, 0]], skeleton.edge_lengths, skeleton.n_components)
-    stays = part == length.argmax()
+    component = skeleton.component_of_vertex
+    length = np.bincount(component[skeleton.edges[:, 0]], skeleton.edge_lengths, skeleton.n_components)
+    stays = component == length.argmax()
     index = np.where(stays, np.cumsum(stays) - 1, -1)
-    left = replace(
-        skeleton,
+    return skeleton.changed(
         **all_of_vertices(skeleton, stays),
         edges=index[skeleton.edges[stays[skeleton.edges[:, 0]]]],
         vertex_of_point=np.append(index, -1)[skeleton.vertex_of_point],
     )
-    return of_input(left)
 
 
 def cut_loops(skeleton: Skeleton) -> tuple[Skeleton, np.ndarray]:
@@ -71,20 +85,21 @@ def cut_loops(skeleton: Skeleton) -> tuple[Skeleton, np.ndarray]:
 
     Examples
     --------
-    >>> from glsk_o3d import skeletonize
-    >>> from glsk_o3d.samples import torus
-    >>> line, cut = cut_loops(skeletonize(torus(2000).points))
+    >>> from glsk_o3d import samples, skeletonize
+    >>> line, cut = cut_loops(skeletonize(samples.torus(2000).points))
     >>> line.n_loops, len(line.leaves), cut.shape
     (0, 2, (1, 2, 3))
     """
+    check_skeleton(skeleton)
     forest = minimum_spanning_tree(linked(skeleton.vertices, skeleton.edges))
-    left = np.sort(np.column_stack(forest.nonzero()), axis=1)
+    remaining = np.sort(np.column_stack(forest.nonzero()), axis=1)
     m = len(skeleton.vertices)
-    stays = np.isin(skeleton.edges @ [m, 1], left @ [m, 1])
-    cut = of_input(replace(skeleton.whole, edges=skeleton.edges[stays]))
-    return cut, skeleton.vertices[skeleton.edges[~stays]]
+    stays = np.isin(skeleton.edges @ [m, 1], remaining @ [m, 1])
+    without_loops = of_input(skeleton.whole.changed(edges=skeleton.edges[stays]))
+    return without_loops, skeleton.vertices[skeleton.edges[~stays]]
 
 
+@_with_all_points
 def detailed(skeleton: Skeleton, *, limb: float) -> Skeleton:
     """Turn the detail up or down: limbs from another probability on than `Refiner.limb`, without a new run.
 
@@ -112,16 +127,16 @@ def detailed(skeleton: Skeleton, *, limb: float) -> Skeleton:
 
     Examples
     --------
-    >>> from glsk_o3d import skeletonize
-    >>> from glsk_o3d.samples import sauropod
-    >>> animal = skeletonize(sauropod(2000).points)
+    >>> from glsk_o3d import samples, skeletonize
+    >>> animal = skeletonize(samples.sauropod(2000).points)
     >>> len(animal.leaves), len(detailed(animal, limb=0.0).leaves)
     (6, 7)
     """
     check_number("limb", limb, low=0, high=1)
-    return of_input(with_limbs(skeleton.whole, limb))
+    return with_limbs(skeleton, limb)
 
 
+@_with_all_points
 def reroot(skeleton: Skeleton, root: RootPlace = "z") -> Skeleton:
     """Number the vertices from a root outwards, as `pipelines.tree` does.
 
@@ -146,22 +161,24 @@ def reroot(skeleton: Skeleton, root: RootPlace = "z") -> Skeleton:
 
     Examples
     --------
-    >>> from glsk_o3d import skeletonize
-    >>> from glsk_o3d.samples import tube
-    >>> line = reroot(skeletonize(tube(1000).points), "x")
+    >>> from glsk_o3d import samples, skeletonize
+    >>> line = reroot(skeletonize(samples.tube(1000).points), "x")
     >>> bool(line.vertices[0, 0] == line.vertices[:, 0].min())
     True
     """
-    if skeleton.n_loops:
-        raise InvalidParameterError(
-            f"the skeleton has {skeleton.n_loops} loops: only trees have a root; see cut_loops (--cut-loops)"
-        )
+    _check_no_loops(skeleton, "only trees have a root")
     if len(skeleton.vertices) == 0:
         raise InvalidParameterError("the skeleton is empty: it has no vertex to be the root")
-    rooted = numbered_from(skeleton.whole, root_among(skeleton.vertices, skeleton, root))
-    return of_input(replace(rooted, report=replace(rooted.report, root=tuple(rooted.vertices[0].tolist()))))
+    rooted = numbered_from(skeleton, root_among(skeleton.vertices, skeleton, root))
+    return rooted.changed(report=replace(rooted.report, root=tuple(rooted.vertices[0].tolist())))
 
 
+def _check_no_loops(skeleton: Skeleton, why: str) -> None:
+    if skeleton.n_loops:
+        raise InvalidParameterError(f"the skeleton has {skeleton.n_loops} loops: {why}; see cut_loops (--cut-loops)")
+
+
+@_with_all_points
 def prune(skeleton: Skeleton, *, length: float = 0.0, order: int | None = None) -> Skeleton:
     """Drop branches with a free end that are short, or of a high order.
 
@@ -186,30 +203,26 @@ def prune(skeleton: Skeleton, *, length: float = 0.0, order: int | None = None) 
 
     Examples
     --------
-    >>> from glsk_o3d import pipelines
-    >>> from glsk_o3d.samples import tree
-    >>> whole = pipelines.tree()(tree(8000, forks=3).points)
+    >>> from glsk_o3d import pipelines, samples
+    >>> whole = pipelines.tree()(samples.tree(8000, forks=3).points)
     >>> len(whole.leaves), len(prune(whole, order=0).leaves)
     (9, 2)
     """
     check_number("length", length, "float", low=0)
     check_number("order", order, "int?", low=0)
-    skeleton = skeleton.whole
     if order is not None:
-        if skeleton.n_loops:
-            trees = "branches have an order in a tree; see cut_loops (--cut-loops)"
-            raise InvalidParameterError(f"the skeleton has {skeleton.n_loops} loops: {trees}")
+        _check_no_loops(skeleton, "branches have an order in a tree")
         table, group = branch_table(skeleton), np.arange(len(skeleton.vertices))
         for row in np.argsort(table.level, kind="stable").tolist():  # parents before their children
             if table.order[row] > order:
                 group[skeleton.branches[row]] = group[table.start[row]]
         skeleton = merge_into(skeleton, group)
-    while ends := _short_ends(skeleton, length):
+    while short := _short_ends(skeleton, length):
         group = np.arange(len(skeleton.vertices))
-        for path in ends:
+        for path in short:
             group[path] = path[0]
         skeleton = merge_into(skeleton, group)
-    return of_input(skeleton)
+    return skeleton
 
 
 def _short_ends(skeleton: Skeleton, least: float) -> list[np.ndarray]:
@@ -224,6 +237,7 @@ def _short_ends(skeleton: Skeleton, least: float) -> list[np.ndarray]:
     return [path for _, path in shortest.values()]
 
 
+@_with_all_points
 def simplify(skeleton: Skeleton, *, tolerance: float = 0.0) -> Skeleton:
     """Drop vertices where the curve is straight, branch by branch (Douglas and Peucker 1973).
 
@@ -246,32 +260,31 @@ def simplify(skeleton: Skeleton, *, tolerance: float = 0.0) -> Skeleton:
 
     Examples
     --------
-    >>> from glsk_o3d import skeletonize
-    >>> from glsk_o3d.samples import torus
-    >>> ring = skeletonize(torus(2000).points)
-    >>> simplify(ring, tolerance=1.0)
+    >>> from glsk_o3d import samples, skeletonize
+    >>> simplify(skeletonize(samples.torus(2000).points), tolerance=1.0)
     Skeleton(3 vertices, 3 edges, 1 components, 1 loops, 0 leaves, 0 junctions)
     """
     check_number("tolerance", tolerance, low=0)
     group = np.arange(len(skeleton.vertices))
-    twins = Counter(tuple(sorted((path[0], path[-1]))) for path in skeleton.branches)
-    for path in skeleton.branches:
+    ends = [tuple(sorted((path[0], path[-1]))) for path in skeleton.branches]
+    parallel = Counter(ends)
+    for path, pair in zip(skeleton.branches, ends, strict=True):
         curve = skeleton.vertices[path]
-        stays = _significance(curve)
-        inner = stays[1:-1]
+        significance = _significance(curve)
+        inner = significance[1:-1]
         if path[0] == path[-1]:  # a ring is at least a triangle
             inner[np.argsort(inner)[-2:]] = np.inf
-        elif twins[tuple(sorted((path[0], path[-1])))] > 1 and len(path) > 2:
+        elif parallel[pair] > 1 and len(path) > 2:
             inner[np.argmax(inner)] = np.inf
-        along, kept = arc_lengths(curve), np.flatnonzero(stays > tolerance)
+        along, kept = arc_lengths(curve), np.flatnonzero(significance > tolerance)
         nearest = np.abs(along[1:-1, None] - along[kept]).argmin(axis=1)
         group[path[1:-1]] = path[kept[nearest]]
-    return of_input(merge_into(skeleton.whole, group))
+    return merge_into(skeleton, group)
 
 
 def _significance(curve: np.ndarray) -> np.ndarray:
     """Largest tolerance at which every place of a curve stays, infinite at its ends, (p,) float array."""
-    found = np.full(len(curve), np.inf)
+    significance = np.full(len(curve), np.inf)
     parts = [(0, len(curve) - 1)]
     while parts:
         first, last = parts.pop()
@@ -279,9 +292,9 @@ def _significance(curve: np.ndarray) -> np.ndarray:
             continue
         offset, chord = curve[first + 1 : last] - curve[first], curve[last] - curve[first]
         along = np.clip(offset @ chord / max(chord @ chord, TINY), 0, 1)
-        away = norm(offset - along[:, None] * chord)
-        farthest = first + 1 + int(away.argmax())
+        distance = norm(offset - along[:, None] * chord)
+        farthest = first + 1 + int(distance.argmax())
         # no more than that of the ends of its part, without which it would not be asked
-        found[farthest] = min(float(away.max()), found[first], found[last])
+        significance[farthest] = min(float(distance.max()), significance[first], significance[last])
         parts += [(first, farthest), (farthest, last)]
-    return found
+    return significance

@@ -87,12 +87,12 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
 
     Examples
     --------
+    >>> from glsk_o3d import Skeleton
     >>> from glsk_o3d.samples import tube
-    >>> from glsk_o3d.data.skeleton import Skeleton
     >>> straight = tube(2000)
     >>> axis = Skeleton(straight.nodes, straight.edges, straight.radii, (), (), ())
-    >>> found = assess(axis, straight.points)
-    >>> found.boundedness, found.topology
+    >>> assessment = assess(axis, straight.points)
+    >>> assessment.boundedness, assessment.topology
     (1.0, 1.0)
     """
     cloud = surface_points(points)
@@ -104,26 +104,26 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
     check_extent(np.concatenate([cloud, skeleton.vertices]))  # a point may be so far off that no place is near
     reach, clusters = _neighbourhood(cloud)
     sections = cross_sections(skeleton.vertices, skeleton.branches, cloud, shortest=reach)
-    found = sections.counts >= MIN_SECTION_POINTS
-    if not found.any():
+    occupied = sections.counts >= MIN_SECTION_POINTS
+    if not occupied.any():
         raise InvalidCloudError(
             f"no part of the skeleton has {MIN_SECTION_POINTS} points around it: is this the cloud it was made from?"
         )
     # places in the largest ball around a junction that holds no point do not count
     junctions = skeleton.vertices[skeleton.junctions]
-    apart = (cdist(sections.places, junctions) >= cKDTree(cloud).query(junctions)[0]).all(axis=1)
-    counted = apart if (apart & found).any() else np.ones_like(found)
-    found &= counted
-    offsets, radii = sections.offsets[found], sections.radii[found]
+    beyond_junctions = (cdist(sections.places, junctions) >= cKDTree(cloud).query(junctions)[0]).all(axis=1)
+    counted = beyond_junctions if (beyond_junctions & occupied).any() else np.ones_like(occupied)
+    occupied &= counted
+    offsets, radii = sections.offsets[occupied], sections.radii[occupied]
     centred = 1 - np.divide(offsets, radii, out=np.sign(offsets), where=offsets < radii)
-    bounded = found & (sections.open_angles < OPEN_ANGLE)
-    radius = radii[cKDTree(sections.places[found]).query(skeleton.vertices)[1]]
+    bounded = occupied & (sections.open_angles < OPEN_ANGLE)
+    radius = radii[cKDTree(sections.places[occupied]).query(skeleton.vertices)[1]]
     cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
     wide = sum(inscribed_circle(skeleton.vertices[cycle])[1] > np.median(radius[cycle]) for cycle in cycles)
     components = skeleton.n_components
     agreement = min(components, clusters) / max(components, clusters)
     return Assessment(
-        centredness=float(np.average(centred, weights=sections.lengths[found])),
+        centredness=float(np.average(centred, weights=sections.lengths[occupied])),
         boundedness=float(np.average(bounded[counted], weights=sections.lengths[counted])),
         topology=float(agreement * (wide / len(cycles) if cycles else 1)),
         components=components,

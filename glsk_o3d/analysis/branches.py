@@ -13,7 +13,7 @@ from ..geometry.cycles import edges_on_cycles
 from ..geometry.polylines import arc_lengths, place_at, relative_distance
 from ..geometry.vectors import Floats, Ints, norm
 from .rows import Rows
-from .segmentation import branch_of_point
+from .segmentation import branch_of_edge, branch_of_point
 
 HEADING_LENGTH = 4.0  # fitted: radii of a junction over which a branch has its direction; where nearer, parts blend
 HEADING_PLACES = 65  # precision: along the half of a branch, at which it is seen where it has left the others
@@ -91,9 +91,7 @@ class BranchTable(Rows, row="branch"):
             del columns["support"]
 
         def cell(value: Any) -> str:
-            if isinstance(value, float):
-                return "-" if np.isnan(value) else f"{value:.4g}"
-            return str(value)
+            return f"{value:.4g}".replace("nan", "-") if isinstance(value, float) else str(value)
 
         return {name: list(map(cell, values)) for name, values in columns.items()}
 
@@ -203,8 +201,8 @@ def _grow(
                 continue
             (row,) = (row for row, path in enumerate(paths) if chosen in path)
             place = int(np.argmax(paths[row] == chosen))
-            way = np.linalg.norm(np.diff(skeleton.vertices[paths[row]], axis=0), axis=1)
-            backwards[row] = way[:place].sum() > way[place:].sum()
+            steps = np.linalg.norm(np.diff(skeleton.vertices[paths[row]], axis=0), axis=1)
+            backwards[row] = steps[:place].sum() > steps[place:].sum()
         else:
             rows = np.flatnonzero(component == part)
             row = rows[np.argmax(volume[rows])]
@@ -268,17 +266,11 @@ def _mean(values: np.ndarray, weights: np.ndarray) -> Any:
 
 def _kinds(skeleton: Skeleton, paths: list[np.ndarray]) -> np.ndarray:
     """The kind of every path, see `BranchTable`."""
-    looped = skeleton.edges[edges_on_cycles(len(skeleton.vertices), skeleton.edges)]
-    on_loops = set(map(frozenset, looped.tolist()))
-
-    def kind(path: np.ndarray) -> str:
-        if len(path) == 1:
-            return "isolated"
-        if frozenset(path[:2].tolist()) in on_loops:
-            return "loop"
-        return "tip" if (skeleton.degree[path[[0, -1]]] == 1).any() else "inner"
-
-    return np.array([kind(path) for path in paths])
+    on_loop = np.zeros(len(paths), bool)
+    on_loop[branch_of_edge(skeleton)] = edges_on_cycles(len(skeleton.vertices), skeleton.edges)
+    degree = skeleton.degree[[path[[0, -1]] for path in paths]]
+    conditions = [(degree == 0).all(axis=1), on_loop, (degree == 1).any(axis=1)]
+    return np.select(conditions, ["isolated", "loop", "tip"], "inner")
 
 
 def _angle(skeleton: Skeleton, paths: list[np.ndarray], at: dict[int, list[int]], row: int, parent: int) -> Any:

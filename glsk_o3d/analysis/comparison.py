@@ -182,18 +182,18 @@ def matching_f1(found: np.ndarray, true: np.ndarray, reach: np.ndarray) -> float
     return 2 * len(matched(found, true, reach)) / (len(found) + len(true))
 
 
-def matched(found: np.ndarray, true: np.ndarray, reach: np.ndarray) -> list[tuple[int, int]]:
-    """The pairs of `matching_f1`: a list of (row of `found`, row of `true`); `reach` may also be (n, m)."""
-    apart = cdist(found, true)
-    return nearest_pairs(np.where(apart <= reach, apart, np.inf))
+def matched(points: np.ndarray, targets: np.ndarray, reach: np.ndarray) -> list[tuple[int, int]]:
+    """The pairs of `matching_f1`: a list of (row of `points`, row of `targets`); `reach` may also be (n, m)."""
+    distance = cdist(points, targets)
+    return nearest_pairs(np.where(distance <= reach, distance, np.inf))
 
 
-def nearest_pairs(apart: np.ndarray) -> list[tuple[int, int]]:
+def nearest_pairs(distance: np.ndarray) -> list[tuple[int, int]]:
     """Pairs (row, column) of finite distances, which become infinite: the nearest first, each row and column once."""
     pairs = []
-    while np.isfinite(apart.min(initial=np.inf)):
-        row, column = np.unravel_index(apart.argmin(), apart.shape)
-        apart[row], apart[:, column] = np.inf, np.inf
+    while np.isfinite(distance.min(initial=np.inf)):
+        row, column = np.unravel_index(distance.argmin(), distance.shape)
+        distance[row], distance[:, column] = np.inf, np.inf
         pairs.append((int(row), int(column)))
     return pairs
 
@@ -205,9 +205,9 @@ def merged_junctions(points: np.ndarray, axis: np.ndarray, axis_radius: np.ndarr
     that of the nearest place; of a cluster it is the largest. `axis` (k, 3) and `axis_radius` (k,) are places along the
     true axis.
     """
-    away = cdist(points, axis)
-    local = np.where(away < axis_radius, axis_radius, 0.0).max(axis=1)
-    local = np.where(local > 0, local, axis_radius[away.argmin(axis=1)])
+    distance = cdist(points, axis)
+    local = np.where(distance < axis_radius, axis_radius, 0.0).max(axis=1)
+    local = np.where(local > 0, local, axis_radius[distance.argmin(axis=1)])
     near = cdist(points, points) <= np.maximum(local[:, None], local)
     group = component_labels(len(points), np.argwhere(near))
     size = np.bincount(group)

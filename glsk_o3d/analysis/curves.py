@@ -23,8 +23,8 @@ def pieces(nodes: np.ndarray, edges: np.ndarray, step: np.ndarray | float) -> tu
     check_places(length, step)
     count = np.maximum(np.ceil(length / step).astype(int), 1)
     row = np.repeat(np.arange(len(edges)), count)
-    before = np.repeat(np.cumsum(count) - count, count)
-    return row, (np.arange(len(row)) - before + 0.5) / count[row]
+    first = np.repeat(np.cumsum(count) - count, count)
+    return row, (np.arange(len(row)) - first + 0.5) / count[row]
 
 
 def check_places(length: np.ndarray | float, step: np.ndarray | float) -> None:
@@ -32,8 +32,8 @@ def check_places(length: np.ndarray | float, step: np.ndarray | float) -> None:
     with np.errstate(all="ignore"):
         places = np.sum(length / step)
     if not places <= MOST_ON_A_CURVE:
-        far = f"{np.sum(length):.3g} long, too long for places {np.min(step):.3g} apart on it"
-        raise InvalidParameterError(f"the skeleton is {far}: are all its coordinates and radii right?")
+        size = f"{np.sum(length):.3g} long, too long for places {np.min(step):.3g} apart on it"
+        raise InvalidParameterError(f"the skeleton is {size}: are all its coordinates and radii right?")
 
 
 def along(edges: np.ndarray, row: np.ndarray, part: np.ndarray, values: np.ndarray) -> Any:
@@ -49,9 +49,9 @@ def distances(curve: Skeleton, other: Skeleton, step: float) -> tuple[np.ndarray
 
     Two (n,) float arrays; the places are `step` apart, and the radius is at least that.
     """
-    (_, here, radius), (_, there, radius_there) = (places_along(skeleton, step) for skeleton in (curve, other))
-    distance, nearest = cKDTree(there).query(here)
-    return distance, np.maximum((radius + radius_there[nearest]) / 2, step)
+    (_, places, radius), (_, targets, target_radius) = (places_along(skeleton, step) for skeleton in (curve, other))
+    distance, nearest = cKDTree(targets).query(places)
+    return distance, np.maximum((radius + target_radius[nearest]) / 2, step)
 
 
 def places_along(skeleton: Skeleton, step: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ from ..data.skeleton import Skeleton
 from ..errors import SkeletonWarning
 from ..geometry.neighbourhoods import plane_axes
 from ..geometry.vectors import TINY, along_axis, norm
-from ..geometry.vectors import unit as directions
+from ..geometry.vectors import unit as unit_vectors
 from ..parameters import check_number
 from .trees import Cylinders, cylinders, lowest_around, points_near, upward
 
@@ -163,19 +163,19 @@ def _stem_section(
     Both ends of the cylinders, `bottom` and `top` (K,), are in metres above the foot; `near` has rows of the points.
     """
     stem = pieces.order == 0
-    there = np.flatnonzero(stem & (bottom <= BREAST_HEIGHT) & (top >= BREAST_HEIGHT))
-    if len(there) == 0:
+    across = stem & (bottom <= BREAST_HEIGHT) & (top >= BREAST_HEIGHT)
+    if not across.any():
         return UNKNOWN, f"the stem does not pass {BREAST_HEIGHT} m above its foot"
-    at = there[0]
+    at = int(across.argmax())
     share = (BREAST_HEIGHT - bottom[at]) / max(top[at] - bottom[at], TINY)
     place = pieces.start_point[at] + share * (pieces.end_point[at] - pieces.start_point[at])
     beside = stem & (unit * norm((pieces.start_point + pieces.end_point) / 2 - place) <= STEM_SPAN)
     beside[at] = True
-    way = directions((pieces.end_point - pieces.start_point)[beside].sum(axis=0, keepdims=True))
+    direction = unit_vectors((pieces.end_point - pieces.start_point)[beside].sum(axis=0, keepdims=True))
     vertices = np.concatenate([skeleton.branches[row] for row in np.unique(pieces.branch[stem])])
     offset = unit * (skeleton.points[near[np.isin(skeleton.vertex_of_point[near], vertices)]] - place)
-    offset = offset[np.abs(offset @ way[0]) <= SLICE / 2]
-    fit = fit_circle(offset @ plane_axes(way)[0])
+    offset = offset[np.abs(offset @ direction[0]) <= SLICE / 2]
+    fit = fit_circle(offset @ plane_axes(direction)[0])
     if fit is None or fit.points < max(FEWEST_ON_CIRCLE, len(offset) / 2):
         on = f"{0 if fit is None else fit.points} of {len(offset)} points of the stem are on a circle"
         few = f"in a slice of {100 * SLICE:g} cm {on}, and half must be, at least {FEWEST_ON_CIRCLE}"
@@ -229,9 +229,9 @@ def fit_circle(points: np.ndarray) -> CircleFit | None:
     corners, sides = corners[usable], sides[usable]
     middle = np.linalg.solve(2 * sides, (sides**2).sum(axis=2)[:, :, None])[:, :, 0]
     centre, radius = corners[:, 0] + middle, np.linalg.norm(middle, axis=1)
-    some = p[rng.permutation(len(p))[:SCORED]]
-    away = np.median(np.abs(np.linalg.norm(some - centre[:, None], axis=2) - radius[:, None]), axis=1)
-    best = away.argmin()
+    scored = p[rng.permutation(len(p))[:SCORED]]
+    score = np.median(np.abs(np.linalg.norm(scored - centre[:, None], axis=2) - radius[:, None]), axis=1)
+    best = score.argmin()
     circle, on = np.append(centre[best], radius[best]), np.zeros(len(p), bool)
     for _ in range(PASSES):
         residual = _residuals(circle, p)

@@ -16,7 +16,7 @@ WIDER = (1, 2, 3)  # measured: clearances to try; in noise of 0.5 % of the diago
 AT_THE_SIDE = np.sqrt(3) / 2  # derived: where a side begins, over the radius: the cosine of 30 degrees
 
 
-class Ways(NamedTuple):
+class Approaches(NamedTuple):
     """Straight ways in to P places, A to each of them."""
 
     position: np.ndarray  # (P, 3)
@@ -25,8 +25,8 @@ class Ways(NamedTuple):
     closing: np.ndarray  # (P, A, 3), from jaw to jaw
 
 
-def free_ways(
-    ways: Ways,
+def check_approaches(
+    approaches: Approaches,
     points: np.ndarray,
     plane: np.ndarray | None,
     middle: np.ndarray,
@@ -36,53 +36,52 @@ def free_ways(
 ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray]:
     """What keeps the gripper from coming in, open a little wider than the `width` of the part, (P,), or wider still.
 
-    `points` are those of the object, if anybody is to look at them. Where the object is says `middle`, (m, 3): on this
-    side of the plane, (4,), and the gripper comes from its diagonal away.
-
-    The reasons, (P, A) bool arrays, are those at the least opening, for ways that are free at none. Three (P, A) arrays
-    follow: the least opening at which the way is free, the depth of the fingertips past the axis, and the number of
-    sides of the part that have points, as in `GraspCandidates`.
+    `points` are those of the object, none if they are not to be checked; `middle`, (m, 3), are on this side of the
+    plane, (4,), and the gripper comes from their diagonal away. The reasons, (P, A) bool arrays, are those at the least
+    opening, for approaches that are free at none. Three (P, A) arrays follow: the least opening at which the approach
+    is free, the depth of the fingertips past the axis, and the number of sides of the part that have points, as in
+    `GraspCandidates`.
     """
-    far = float(np.linalg.norm(np.ptp(middle, axis=0)))
+    distance = float(np.linalg.norm(np.ptp(middle, axis=0)))
     surface = cells(points, CLOSE_POINTS * min(gripper.finger[:2]))
     depth = np.minimum(gripper.reach, width / 2)
-    shape = ways.approach.shape[:2]
-    reasons: dict[str, Any] = {}
-    opening, seen, free = np.full(shape, np.nan), np.zeros(shape, int), np.zeros(shape, bool)
+    shape = approaches.approach.shape[:2]
+    first: dict[str, Any] = {}
+    opening, sides_seen, free = np.full(shape, np.nan), np.zeros(shape, int), np.zeros(shape, bool)
     for times in WIDER:
         wide = np.minimum(width + times * clearance, gripper.max_opening)
-        low, high = swept(gripper, wide, depth, clearance, far)
-        asked, found = ~free, dict[str, Any]()
+        low, high = swept(gripper, wide, depth, clearance, distance)
+        possible, reasons = ~free, dict[str, Any]()
         if len(points):
-            touched = hits(ways, surface, low, high, asked).any(axis=2)
-            asked &= ~touched
-            beside = hits(ways, surface, *sides(gripper, wide, depth, width), asked)
-            seen = np.where(asked, beside.sum(axis=2), seen)
-            empty = asked & ~beside[..., :2].any(axis=2)
-            asked &= ~empty
-            found |= {"ways in that touch points": touched, "ways in with nothing between the jaws": empty}
-        behind = asked & (plane is not None and hits_plane(ways, plane, middle, low, high).any(axis=2))
-        asked &= ~behind
-        found["ways in behind the plane"] = behind
-        opening = np.where(asked, wide[:, None], opening)
-        free |= asked
-        reasons = reasons or found
-    met = {name: part & ~free for name, part in reasons.items()}
-    return met, opening, np.broadcast_to(depth[:, None], shape), seen
+            touching = hits(approaches, surface, low, high, possible).any(axis=2)
+            possible &= ~touching
+            occupied = hits(approaches, surface, *sides(gripper, wide, depth, width), possible)
+            sides_seen = np.where(possible, occupied.sum(axis=2), sides_seen)
+            empty = possible & ~occupied[..., :2].any(axis=2)
+            possible &= ~empty
+            reasons |= {"ways in that touch points": touching, "ways in with nothing between the jaws": empty}
+        behind = possible & (plane is not None and hits_plane(approaches, plane, middle, low, high).any(axis=2))
+        possible &= ~behind
+        reasons["ways in behind the plane"] = behind
+        opening = np.where(possible, wide[:, None], opening)
+        free |= possible
+        first = first or reasons
+    blocked = {name: part & ~free for name, part in first.items()}
+    return blocked, opening, np.broadcast_to(depth[:, None], shape), sides_seen
 
 
 def swept(
-    gripper: Gripper, opening: np.ndarray, depth: np.ndarray, clearance: float, way: float
+    gripper: Gripper, opening: np.ndarray, depth: np.ndarray, clearance: float, distance: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Corners, (P, 3, 3), of what the gripper's boxes sweep on a straight way in, with half the clearance around them.
 
     The inner faces of the fingers stay: between them and the part is half the clearance already.
     """
     low, high = gripper.boxes(opening, depth)
-    towards, away = np.full((2, 3, 3), clearance / 2)
-    away[0, 0] = towards[1, 0] = 0
-    towards[:, 2] += way
-    return low - towards, high + away
+    before, behind = np.full((2, 3, 3), clearance / 2)
+    behind[0, 0] = before[1, 0] = 0
+    before[:, 2] += distance
+    return low - before, high + behind
 
 
 def sides(gripper: Gripper, opening: np.ndarray, depth: np.ndarray, width: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -116,29 +115,30 @@ def cells(points: np.ndarray, close: float) -> np.ndarray:
     return (points[:, None] + points[neighbour]) / 2  # each is its own nearest
 
 
-def hits(ways: Ways, surface: np.ndarray, low: np.ndarray, high: np.ndarray, asked: np.ndarray) -> np.ndarray:
-    """Which boxes have pieces of surface in them, (P, A, B) bool array, of the ways that are `asked`, (P, A).
+def hits(
+    approaches: Approaches, surface: np.ndarray, low: np.ndarray, high: np.ndarray, possible: np.ndarray
+) -> np.ndarray:
+    """Which boxes have pieces of surface in them, (P, A, B) bool array, of the approaches that are `possible`, (P, A).
 
     `surface` is what `cells` gives; `low` and `high`, (P, B, 3), are corners in the frame of the gripper: x closing, y
     axis of the part, z approach.
     """
-    found = np.zeros((*asked.shape, low.shape[1]), bool)
-    if not (len(surface) and asked.any()):
-        return found
+    hit = np.zeros((*possible.shape, low.shape[1]), bool)
+    if not (len(surface) and possible.any()):
+        return hit
     reach = norm(np.maximum(np.abs(low), np.abs(high))).max() + norm(surface - surface[:, :1]).max()
-    within = cKDTree(ways.position).query(surface[:, 0], distance_upper_bound=reach)[0] <= reach
-    surface = surface[within]
-    for place in np.flatnonzero(asked.any(axis=1)):
-        some = np.flatnonzero(asked[place])
-        first, last = _ends(surface @ ways.axis[place] - ways.position[place] @ ways.axis[place])
+    surface = surface[cKDTree(approaches.position).query(surface[:, 0], distance_upper_bound=reach)[0] <= reach]
+    for place in np.flatnonzero(possible.any(axis=1)):
+        rows, position, axis = np.flatnonzero(possible[place]), approaches.position[place], approaches.axis[place]
+        first, last = _ends(surface @ axis - position @ axis)
         near = np.flatnonzero((last > low[place, :, 1].min()) & (first < high[place, :, 1].max()))
-        offset = surface[near] - ways.position[place]
-        x, z = offset @ ways.closing[place, some].T, offset @ ways.approach[place, some].T
+        offset = surface[near] - position
+        x, z = offset @ approaches.closing[place, rows].T, offset @ approaches.approach[place, rows].T
         least, most = zip(_ends(x), (first[near, None], last[near, None]), _ends(z), strict=True)
         for box in range(low.shape[1]):
             inside = [(most[i] > low[place, box, i]) & (least[i] < high[place, box, i]) for i in range(3)]
-            found[place, some, box] = (inside[0] & inside[1] & inside[2]).any(axis=0)
-    return found
+            hit[place, rows, box] = (inside[0] & inside[1] & inside[2]).any(axis=0)
+    return hit
 
 
 def _ends(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -146,25 +146,27 @@ def _ends(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return (values[:, 0], values[:, 0]) if values.shape[1] == 1 else (values.min(axis=1), values.max(axis=1))
 
 
-def hits_plane(ways: Ways, plane: np.ndarray, middle: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+def hits_plane(
+    approaches: Approaches, plane: np.ndarray, middle: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
     """Which boxes, as in `hits`, reach behind the plane a x + b y + c z + d = 0, seen from the points of the object."""
     size = np.linalg.norm(plane[:3])
     normal, shift = plane[:3] / size, plane[3] / size
     if np.median(middle @ normal + shift) < 0:
         normal, shift = -normal, -shift
-    frame = np.stack([ways.closing, np.broadcast_to(ways.axis[:, None], ways.approach.shape), ways.approach], axis=2)
-    slope = (frame @ normal)[:, :, None]
+    axis = np.broadcast_to(approaches.axis[:, None], approaches.approach.shape)
+    slope = (np.stack([approaches.closing, axis, approaches.approach], axis=2) @ normal)[:, :, None]
     lowest = np.where(slope > 0, low[:, None], high[:, None])
-    return (ways.position @ normal + shift)[:, None, None] + (lowest * slope).sum(axis=3) < 0
+    return (approaches.position @ normal + shift)[:, None, None] + (lowest * slope).sum(axis=3) < 0
 
 
 def checked_plane(plane: Any) -> np.ndarray:
     """The plane as a (4,) float array; InvalidParameterError if it is none."""
     try:
-        found = np.asarray(plane, float).reshape(4)
+        numbers = np.asarray(plane, float).reshape(4)
     except (TypeError, ValueError):
-        found = np.zeros(4)
-    if not (np.isfinite(found).all() and found[:3].any()):
+        numbers = np.zeros(4)
+    if not (np.isfinite(numbers).all() and numbers[:3].any()):
         must = "must be finite a, b, c, d of ax + by + cz + d = 0, a, b, c not all 0"
         raise InvalidParameterError(f"plane = {plane!r}: {must}")
-    return found
+    return numbers

@@ -14,7 +14,7 @@ from ..geometry.groups import group_rank
 from ..geometry.polylines import arc_lengths
 from ..parameters import check_number
 from .curves import check_places
-from .grasp_checks import Ways, checked_plane, free_ways
+from .grasp_checks import Approaches, check_approaches, checked_plane
 from .gripper import GraspCandidates, Gripper, listed
 
 UNLIKELY_OPENING = 20.0  # derived: openings over diagonals: above those of hands and screws, below those of mm and m
@@ -99,12 +99,12 @@ def grasp_candidates(
     if gripper.max_opening > UNLIKELY_OPENING * np.linalg.norm(np.ptp(middle, axis=0)):
         many = f"more than {UNLIKELY_OPENING:g} times as wide as the object is long"
         warnings.warn(f"the gripper opens {many}: are the units the same?", SkeletonWarning, stacklevel=outside())
-    place, branch, width, quality, left_out, looked_at = _fitting(skeleton, gripper, clearance, spacing, min_confidence)
+    place, branch, width, quality, left_out, examined = _fitting(skeleton, gripper, clearance, spacing, min_confidence)
     position, axis = place[:, :3], place[:, 3:6]
     approach = _directions_around(axis, around)
-    ways = Ways(position, axis, approach, np.cross(axis[:, None], approach))
-    blocked, opening, depth, seen = free_ways(ways, points, plane, middle, gripper, width, clearance)
-    free, ways_left_out = _sorted_out(blocked)
+    approaches = Approaches(position, axis, approach, np.cross(axis[:, None], approach))
+    blocked, opening, depth, seen = check_approaches(approaches, points, plane, middle, gripper, width, clearance)
+    free, approaches_left_out = _without_reasons(blocked)
     quality = quality[free // around] * (seen.ravel()[free] / 3 if len(points) else 1)
     # the best of each place, then the second best of each; in each round the best first; equal ones in their order
     best = np.argsort(-quality.round(9), kind="stable")
@@ -114,7 +114,7 @@ def grasp_candidates(
     candidates = GraspCandidates(
         position=position[row],
         approach=approach.reshape(-1, 3)[free],
-        closing=ways.closing.reshape(-1, 3)[free],
+        closing=approaches.closing.reshape(-1, 3)[free],
         opening=opening.ravel()[free],
         depth=depth.ravel()[free],
         branch=branch[row],
@@ -122,12 +122,12 @@ def grasp_candidates(
         quality=quality,
         seen=seen.ravel()[free],
         gripper=gripper,
-        places=looked_at,
-        left_out=left_out | ways_left_out,
+        places=examined,
+        left_out=left_out | approaches_left_out,
     )
     if len(candidates) == 0:
         why = listed(candidates.left_out) or "the skeleton has no branch"
-        warnings.warn(f"no grasp at {looked_at} places: {why}", SkeletonWarning, stacklevel=outside())
+        warnings.warn(f"no grasp at {examined} places: {why}", SkeletonWarning, stacklevel=outside())
     return candidates
 
 
@@ -135,10 +135,10 @@ def _fitting(
     skeleton: Skeleton, gripper: Gripper, clearance: float, spacing: float | None, min_confidence: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, int], int]:
     """Places that fit between the jaws, as of `_places_on`, the branch, width and quality of each, how many do not fit,
-    by reason, and how many were looked at."""
-    found = [_places_on(skeleton, path, spacing) for path in skeleton.branches]
-    place = np.concatenate([np.empty((0, 9)), *found])
-    branch = np.repeat(np.arange(len(found)), list(map(len, found))) if found else np.empty(0, int)
+    by reason, and how many were examined."""
+    places = [_places_on(skeleton, path, spacing) for path in skeleton.branches]
+    counts = np.array(list(map(len, places)), int)
+    place, branch = np.concatenate([np.empty((0, 9)), *places]), np.repeat(np.arange(len(places)), counts)
     radius, slope, confidence = place[:, 6:].T
     with np.errstate(divide="ignore", invalid="ignore"):
         even = np.sqrt(np.clip(1 - slope**2, 0, None))
@@ -149,14 +149,13 @@ def _fitting(
         "too wide": width + clearance > gripper.max_opening,
         "uncertain": ~(confidence >= min_confidence) if min_confidence > 0 else np.zeros(len(width), bool),
     }
-    some, left_out = _sorted_out(reasons)
-    short = sum(len(rows) == 0 for rows in found)
-    if short:
-        left_out["branches without a place between their margins"] = short
-    return place[some], branch[some], width[some], quality[some], left_out, len(place)
+    fits, left_out = _without_reasons(reasons)
+    if not counts.all():
+        left_out["branches without a place between their margins"] = int((counts == 0).sum())
+    return place[fits], branch[fits], width[fits], quality[fits], left_out, len(place)
 
 
-def _sorted_out(reasons: dict[str, np.ndarray]) -> tuple[np.ndarray, dict[str, int]]:
+def _without_reasons(reasons: dict[str, np.ndarray]) -> tuple[np.ndarray, dict[str, int]]:
     """The rows for which no reason holds, and how often each is the first that does."""
     first = np.select([reason.ravel() for reason in reasons.values()], list(reasons), "")
     return np.flatnonzero(first == ""), dict(Counter(first[first != ""].tolist()))
@@ -188,22 +187,21 @@ def _places_on(skeleton: Skeleton, path: np.ndarray, spacing: float | None) -> n
         period = {"period": length} if closed else {}
         return np.column_stack([np.interp(places, along, column, **period) for column in values.T])
 
-    here = sample(at)
-    reach = np.where(here[:, 3] > 0, here[:, 3], step)
+    values_at = sample(at)
+    reach = np.where(values_at[:, 3] > 0, values_at[:, 3], step)
     if closed:
         reach = np.minimum(reach, length / 4)
-    before, behind = np.clip([at - reach, at + reach], *((-np.inf, np.inf) if closed else (0, length)))
-    chord = sample(behind) - sample(before)
+    start, end = np.clip([at - reach, at + reach], *((-np.inf, np.inf) if closed else (0, length)))
+    chord = sample(end) - sample(start)
     size: np.ndarray = np.linalg.norm(chord[:, :3], axis=1, keepdims=True)
     axis = np.divide(chord[:, :3], size, out=np.full((count, 3), np.nan), where=size > 0)
-    apart = behind - before
-    slope = np.divide(chord[:, 3], apart, out=np.zeros(count), where=apart > 0)
-    return np.column_stack([here[:, :3], axis, here[:, 3], slope, here[:, 4]])[size[:, 0] > 0]
+    slope = np.divide(chord[:, 3], end - start, out=np.zeros(count), where=end > start)
+    return np.column_stack([values_at[:, :3], axis, values_at[:, 3], slope, values_at[:, 4]])[size[:, 0] > 0]
 
 
 def _directions_around(axis: np.ndarray, n: int) -> np.ndarray:
     """Directions perpendicular to each axis, (P, n, 3), evenly around it; the first points down as far as it can."""
-    down, aside = (way - axis * (axis @ way)[:, None] for way in (np.array([0.0, 0, -1]), np.array([1.0, 0, 0])))
+    down, aside = (v - axis * (axis @ v)[:, None] for v in (np.array([0.0, 0, -1]), np.array([1.0, 0, 0])))
     size = np.linalg.norm(down, axis=1, keepdims=True)
     first = np.where(size > 1e-6, down, aside)
     first /= np.linalg.norm(first, axis=1, keepdims=True)

@@ -33,13 +33,9 @@ class Rows:
         columns: dict[str, list[Any]] = {self._row: list(range(len(self)))}
         for field in fields(self):  # type: ignore[arg-type]
             array = getattr(self, field.name)
-            if not isinstance(array, np.ndarray):
-                continue
-            if array.ndim == 1:
-                columns[field.name] = array.tolist()
-            else:
-                coordinates = zip("xyz", array.T.tolist(), strict=True)
-                columns |= {f"{field.name}_{axis}": column for axis, column in coordinates}
+            if isinstance(array, np.ndarray):
+                names = [field.name] if array.ndim == 1 else [f"{field.name}_{axis}" for axis in "xyz"]
+                columns |= zip(names, np.atleast_2d(array.T).tolist(), strict=True)
         return columns
 
     def __iter__(self) -> Iterator[dict[str, Any]]:

@@ -9,8 +9,7 @@ from ..errors import InvalidParameterError
 from ..geometry.groups import Members
 from ..geometry.neighbourhoods import plane_axes
 from ..geometry.polylines import arc_lengths, place_at, relative_distance
-from ..geometry.vectors import AXES, Floats, along_axis, norm
-from ..geometry.vectors import unit as directions
+from ..geometry.vectors import AXES, Floats, along_axis, norm, unit
 from .branches import branch_table
 from .rows import Rows
 
@@ -160,9 +159,9 @@ def points_near(skeleton: Any) -> np.ndarray:
     """Rows of the points no farther from their vertex than three radii and the longest edge there."""
     owner, longest = skeleton.vertex_of_point, np.zeros(len(skeleton.vertices))
     np.maximum.at(longest, skeleton.edges, skeleton.edge_lengths[:, None])
-    some = np.flatnonzero(owner >= 0)
-    away = norm(skeleton.points[some] - skeleton.vertices[owner[some]])
-    return some[away <= (OUTSIDE * skeleton.radii + longest)[owner[some]]]
+    owned = np.flatnonzero(owner >= 0)
+    distance = norm(skeleton.points[owned] - skeleton.vertices[owner[owned]])
+    return owned[distance <= (OUTSIDE * skeleton.radii + longest)[owner[owned]]]
 
 
 def lowest_around(points: np.ndarray, foot: np.ndarray, onward: np.ndarray, radius: float, up: str) -> float:
@@ -204,7 +203,7 @@ def _length_inside(skeleton: Any, path: np.ndarray, along: np.ndarray, others: l
     radius = np.interp(beyond, along, skeleton.radii[path])
     turn = np.pi * (3 - np.sqrt(5)) * np.arange(ON_SECTION)  # a sunflower's, which fills a disc evenly
     disc = np.sqrt((np.arange(ON_SECTION) + 0.5) / ON_SECTION) * np.stack([np.cos(turn), np.sin(turn)])
-    axes = plane_axes(directions(np.gradient(places, axis=0)))
+    axes = plane_axes(unit(np.gradient(places, axis=0)))
     points = places[:, None] + (radius[:, None, None] * (axes @ disc)).swapaxes(1, 2)
     near = []
     for other in others:
@@ -226,11 +225,11 @@ def _beyond_tips(skeleton: Any) -> dict[int, float]:
     beyond = {}
     for tip, beside in ends.tolist():
         points = skeleton.points[members.of(np.array([tip, beside]))]
-        way = skeleton.vertices[tip] - skeleton.vertices[beside]
-        if len(points) and way.any():
-            offset, ahead = points - skeleton.vertices[tip], way / np.linalg.norm(way)
-            along = offset @ ahead
-            aside = norm(offset - along[:, None] * ahead)
+        step = skeleton.vertices[tip] - skeleton.vertices[beside]
+        if len(points) and step.any():
+            offset, direction = points - skeleton.vertices[tip], step / np.linalg.norm(step)
+            along = offset @ direction
+            aside = norm(offset - along[:, None] * direction)
             reach = np.quantile(along[aside <= max(OUTSIDE * skeleton.radii[beside], aside.min())], TIP_QUANTILE)
             half = skeleton.radii[beside] / 2
             beyond[tip] = max(float(reach - 2 / 3 * np.clip(reach - half, 0, half)), 0.0)
@@ -239,6 +238,6 @@ def _beyond_tips(skeleton: Any) -> dict[int, float]:
 
 def _place_beyond(curve: np.ndarray, along: np.ndarray, lengths: np.ndarray) -> np.ndarray:
     """The places so far along a curve, which goes straight on at both ends."""
-    before, behind = directions(curve[[0, -1]] - curve[[1, -2]])
-    places = place_at(curve, along, lengths) + np.maximum(-lengths, 0)[:, None] * before
-    return places + np.maximum(lengths - along[-1], 0)[:, None] * behind
+    backward, forward = unit(curve[[0, -1]] - curve[[1, -2]])
+    places = place_at(curve, along, lengths) + np.maximum(-lengths, 0)[:, None] * backward
+    return places + np.maximum(lengths - along[-1], 0)[:, None] * forward

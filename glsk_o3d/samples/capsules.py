@@ -7,8 +7,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ..errors import InvalidParameterError
+from ..geometry.vectors import Floats
 
-Floats: TypeAlias = np.ndarray[Any, np.dtype[np.float64]]
 Chain: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]  # nodes, edges, radii
 
 
@@ -58,19 +58,21 @@ def checked_generator(n: Any, noise: float, seed: Any, **positive: float) -> np.
 
 def collect(draw: Callable[[int], np.ndarray], n: int) -> np.ndarray:
     """Exactly n rows from a function that draws at most as many as it is asked for."""
-    found, total, batch = [], 0, max(n, 256)
+    rows, total, batch = list[np.ndarray](), 0, max(n, 256)
     while total < n:
-        found.append(draw(batch))
-        total += len(found[-1])
-        batch = max(256, int(1.1 * batch * (n - total) / max(len(found[-1]), 1)))
-    return np.concatenate(found)[:n]
+        rows.append(draw(batch))
+        total += len(rows[-1])
+        batch = max(256, int(1.1 * batch * (n - total) / max(len(rows[-1]), 1)))
+    return np.concatenate(rows)[:n]
 
 
 def noisy(points: Floats, noise: float, rng: np.random.Generator) -> np.ndarray:
     """The points with Gaussian noise, which is a share of the diagonal of their box."""
-    if noise == 0:
-        return points
-    return points + rng.normal(scale=noise * np.linalg.norm(np.ptp(points, axis=0)), size=points.shape)
+    return (
+        points
+        if noise == 0
+        else points + rng.normal(scale=noise * np.linalg.norm(np.ptp(points, axis=0)), size=points.shape)
+    )
 
 
 def directions(n: int, rng: np.random.Generator) -> np.ndarray:
@@ -130,8 +132,7 @@ def union_sample(
 ) -> Sample:
     """n points, uniform by area, on the outer surface of the union, as far as one of the cameras sees it."""
     rng = checked_generator(n, noise, seed)
-    a, b = nodes[edges[:, 0]], nodes[edges[:, 1]]
-    ra, rb = radii[edges[:, 0]], radii[edges[:, 1]]
+    (a, b), (ra, rb) = nodes[edges].swapaxes(0, 1), radii[edges].T
     length = np.linalg.norm(b - a, axis=1)
     slope = (ra - rb) / length
     if (np.abs(slope) >= 1).any():
@@ -146,11 +147,9 @@ def union_sample(
 
     def draw(m: int) -> np.ndarray:
         piece = rng.choice(len(areas), m, p=areas / areas.sum())
-        points = np.empty((m, 3))
-        on_ball = piece < len(nodes)
-        ball = piece[on_ball]
+        points, on_ball = np.empty((m, 3)), piece < len(nodes)
+        ball, cone = piece[on_ball], piece[~on_ball] - len(nodes)
         points[on_ball] = nodes[ball] + radii[ball, None] * directions(len(ball), rng)
-        cone = piece[~on_ball] - len(nodes)
         big, small = np.maximum(ra, rb)[cone], np.minimum(ra, rb)[cone]
         u = rng.random(len(cone))
         radius = np.sqrt(big**2 + u * (small**2 - big**2))  # by area: density proportional to the radius
@@ -159,13 +158,12 @@ def union_sample(
         aside = rng.normal(size=(len(cone), 3))
         aside -= axis[cone] * (aside * axis[cone]).sum(axis=1, keepdims=True)
         aside /= np.linalg.norm(aside, axis=1, keepdims=True)
-        out = aside * lean[cone, None] + axis[cone] * slope[cone, None]
-        points[~on_ball] = a[cone] + (b - a)[cone] * share[:, None] + radius[:, None] * out
+        outward = aside * lean[cone, None] + axis[cone] * slope[cone, None]
+        points[~on_ball] = a[cone] + (b - a)[cone] * share[:, None] + radius[:, None] * outward
         points = points[signed_distance(points, nodes, edges, radii) > -1e-9]
-        if cameras is not None:
-            seen = [visible(points, camera, nodes, edges, radii) for camera in cameras]
-            points = points[np.any(seen, axis=0)]
-        return points
+        if cameras is None:
+            return points
+        return points[np.any([visible(points, camera, nodes, edges, radii) for camera in cameras], axis=0)]
 
     return Sample(noisy(collect(draw, n), noise, rng), nodes, edges, radii, name)
 

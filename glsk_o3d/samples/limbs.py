@@ -6,7 +6,8 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from ..errors import InvalidParameterError
-from .capsules import Floats, Sample, checked_generator, directions, union_sample
+from ..geometry.vectors import Floats
+from .capsules import Sample, checked_generator, directions, union_sample
 
 TWO_CAMERAS = ((1.1, 1.8, 1.4), (-1.2, -1.7, 1.3))
 """Where the sauropod is scanned from: front left and rear right, a little above it."""
@@ -14,7 +15,7 @@ TWO_CAMERAS = ((1.1, 1.8, 1.4), (-1.2, -1.7, 1.3))
 PIECES = 6  # of which a limb is made
 TRIED = 40  # limbs drawn for each that grows
 SHORTER = 0.76  # a limb than the one before
-THINNER = np.sqrt(0.5)  # at its end than at its beginning, so that two that fork have the cross-section of one
+NARROWING = np.sqrt(0.5)  # end over beginning, so that the two limbs of a fork have the cross-section of one
 LEAN, BEND, UPWARDS = 0.7, 0.3, 0.2  # how far limbs turn aside at a fork, on their way, and towards the light
 
 
@@ -154,7 +155,7 @@ def tree(
             limb, first = drawn[np.argmax(clear)], len(nodes)  # the one farthest from all others grows
             edges += [(root, first), *((at, at + 1) for at in range(first, first + PIECES - 1))]
             nodes = np.concatenate([nodes, limb])
-            radii = np.append(radii, np.linspace(radii[root], radii[root] * THINNER, PIECES + 1)[1:])
+            radii = np.append(radii, np.linspace(radii[root], radii[root] * NARROWING, PIECES + 1)[1:])
             grown.append((len(nodes) - 1, limb[-1] - limb[-2]))
         tips = grown
     return union_sample("tree", nodes, np.array(edges, np.int64), radii, n, noise, seed, cameras)

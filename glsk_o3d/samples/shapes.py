@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import InvalidParameterError
-from .capsules import Chain, Floats, Sample, chain, checked_generator, collect, directions, noisy, union_sample
+from ..geometry.vectors import Floats
+from .capsules import Chain, Sample, chain, checked_generator, collect, directions, noisy, union_sample
 
 
 def tube(

@@ -10,7 +10,7 @@ from glsk_o3d.analysis.assessment import cross_sections
 from glsk_o3d.errors import InvalidCloudError, InvalidParameterError
 from glsk_o3d.samples import helix, sample_object, torus, tube, two_rings, y_junction
 
-LINE = [[0, 0, 0], [1, 0, 0]]
+LINE, NOWHERE = [[0, 0, 0], [1, 0, 0]], np.full((20, 3), np.nan)
 
 
 @pytest.mark.parametrize(
@@ -93,19 +93,16 @@ def test_points_in_a_row_have_sections_without_a_radius(away, centredness, curve
     assert assess(curve(LINE), row).centredness == centredness
 
 
-@pytest.mark.parametrize("cloud", [np.zeros((20, 3)), np.full((20, 3), np.nan), np.eye(3)])
-def test_clouds_with_too_few_points(cloud, curve):
-    with pytest.raises(InvalidCloudError, match="6 points around"):
-        assess(curve(LINE), cloud)
-
-
-def test_clouds_whose_squares_overflow_are_refused(pipe, curve):
-    for cloud in (pipe.points * 1e200, pipe.points * 1e-200, [[1e200, 0, 0]]):
-        with pytest.raises(InvalidCloudError, match="its square is out of range"):
-            assess(curve(LINE), np.array(cloud))
-
-
-@pytest.mark.parametrize("vertices", [np.empty((0, 3)), [[0, 0, 0]], [[1, 1, 1], [1, 1, 1]]])
-def test_no_curve_to_assess(pipe, vertices, curve):
-    with pytest.raises(InvalidParameterError, match="no edge with a length"):
-        assess(curve(vertices), pipe.points)
+@pytest.mark.parametrize(
+    ("vertices", "cloud", "error", "message"),
+    [
+        *((LINE, cloud, InvalidCloudError, "6 points around") for cloud in (np.zeros((20, 3)), NOWHERE, np.eye(3))),
+        *((LINE, scale * np.eye(3), InvalidCloudError, "its square is out of range") for scale in (1e200, 1e-200)),
+        (LINE, [[1e200, 0, 0]], InvalidCloudError, "its square is out of range"),
+        *((none, np.eye(3), InvalidParameterError, "no edge with a length") for none in ([[0, 0, 0]], [[1, 1, 1]] * 2)),
+        (np.empty((0, 3)), np.eye(3), InvalidParameterError, "no edge with a length"),
+    ],
+)
+def test_what_is_refused(vertices, cloud, error, message, curve):
+    with pytest.raises(error, match=message):
+        assess(curve(vertices), np.array(cloud))

@@ -17,10 +17,6 @@ RNG = np.random.default_rng(0)
 ANGLES, SHARE = (30.0, 50.0), 0.6
 
 
-def axis_of(sample):
-    return Skeleton(sample.nodes, sample.edges, sample.radii, (), (), ())
-
-
 def grow(levels=3, pieces=8):
     """A plane tree: every branch ends in two, 30 degrees to one side and 50 to the other, 0.6 as long and thick."""
     nodes, edges, radii = [np.zeros(2)], [], [0.1]
@@ -42,9 +38,6 @@ def grow(levels=3, pieces=8):
 
 
 TREE = grow()
-
-
-# ---------------------------------------------------------------------------------------------------------- the table
 
 
 def test_a_tree_with_known_numbers():
@@ -100,7 +93,7 @@ def test_y_junction_from_its_cloud():
     assert found.points.sum() == 2000
 
 
-def test_loops():
+def test_loops(axis_of):
     table = branch_table(axis_of(samples.two_rings()))
     assert table.kind.tolist() == ["loop", "loop"]
     assert table.component.tolist() == [0, 1]
@@ -243,7 +236,7 @@ def test_nothing_continues_what_turns_back_or_is_closed():
     assert sorted(loop.order.tolist()) == [0, 1]
 
 
-def test_a_torso_goes_on_at_both_ends():
+def test_a_torso_goes_on_at_both_ends(axis_of):
     table = branch_table(axis_of(samples.sauropod(1000)))
     assert sorted(table.kind.tolist()) == ["inner"] * 2 + ["loop"] * 2 + ["tip"] * 6
     (body,) = np.flatnonzero(table.level == 0)
@@ -261,9 +254,13 @@ def test_print():
     head, names, first, *others = str(table).splitlines()
     assert head == repr(table) == "BranchTable(15 branches, 4 levels)"
     assert set(names.split()) == set(PRINTED_COLUMNS) - {"support"}
-    told = dict(zip(names.split(), first.split(), strict=True))
-    assert (told["branch"], told["parent"], told["length"], told["angle"]) == ("0", "-1", f"{table.length[0]:.4g}", "-")
-    assert len(others) == 14
+    cells = dict(zip(names.split(), first.split(), strict=True))
+    assert [cells[name] for name in ("branch", "parent", "length", "angle")] == [
+        "0",
+        "-1",
+        f"{table.length[0]:.4g}",
+        "-",
+    ]
     assert {len(line) for line in (first, *others)} == {len(names)}
     assert str(supported).splitlines()[2].split().count("0.5") == 2  # it has a confidence as well
 
@@ -284,9 +281,6 @@ def test_an_empty_skeleton():
         with pytest.raises(InvalidParameterError, match="empty"):
             ask(nothing)
     assert len(nothing.to_networkx()) == 0
-
-
-# --------------------------------------------------------------------------------------------------------- the points
 
 
 @pytest.fixture(scope="module")

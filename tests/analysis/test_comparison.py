@@ -6,11 +6,10 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
-from glsk_o3d import annotate, read_truth, save_skeleton, skeletonize, to_line_set, to_tubes
+from glsk_o3d import annotate, editing, read_truth, save_skeleton, skeletonize, to_line_set, to_tubes
 from glsk_o3d.analysis import Truth, branch_table, compare, segment
 from glsk_o3d.analysis.comparison import matching_f1
 from glsk_o3d.analysis.curves import distances
-from glsk_o3d.data.skeleton import Skeleton
 from glsk_o3d.errors import FileFormatError, InvalidParameterError
 from glsk_o3d.samples import helix, sample_object, sphere, torus, tube, two_rings, y_junction
 
@@ -104,9 +103,6 @@ def test_units_places_and_the_order_of_vertices_do_not_matter(scale, curve):
     assert expected["error"] > 0.05
 
 
-# ----------------------------------------------------------------------------------------------------- tips, junctions
-
-
 @pytest.mark.parametrize(("shift", "share"), [(0, 1), (2.4, 1), (2.6, 0)])
 def test_tips_are_met_within_two_and_a_half_radii(shift, share, axis_of):
     sample = tube(100, radius=0.1)
@@ -142,14 +138,13 @@ def cross(gap):
 
 @pytest.mark.parametrize(("gap", "share"), [(0.19, 1), (0.21, 2 / 3)])
 def test_junctions_less_than_a_radius_apart_are_one(gap, share, curve):
-    nodes = np.array([[-2, -1, 0], [-2, 1, 0], [2, -1, 0], [2, 1, 0], [0, 0, 0]], float)
-    true = Truth(nodes, [[0, 4], [1, 4], [2, 4], [3, 4]], np.full(5, 0.2))
-    found = compare(curve(*cross(gap)), true)
+    (vertices, edges), nodes = cross(gap), np.delete(cross(0)[0], 5, axis=0)
+    one = [[0, 4], [1, 4], [2, 4], [3, 4]]
+    found = compare(curve(vertices, edges), Truth(nodes, one, np.full(5, 0.2)))
     assert found.junctions_f1 == pytest.approx(share)
     assert (found.tips_f1, found.perfect, found.junctions) == (1, True, 1)
-    vertices, edges = cross(gap)
     other = Truth(vertices, edges, np.full(6, 0.2))
-    assert compare(curve(nodes, true.edges), other).junctions_f1 == pytest.approx(share)
+    assert compare(curve(nodes, one), other).junctions_f1 == pytest.approx(share)
 
 
 @pytest.mark.parametrize(("away", "share"), [(0.38, 1), (0.42, 0)])
@@ -159,20 +154,16 @@ def test_junctions_are_met_within_two_radii(away, share, curve):
     assert compare(curve(moved, edges), Truth(vertices, edges, np.full(6, 0.2))).junctions_f1 == share
 
 
-# ------------------------------------------------------------------------------------------- two curves, and no axis
-
-
-def test_distances_between_lines():
-    def line(start, end, radii, edges=((0, 1),)):
-        return Skeleton([start, end], list(edges), radii, (), (), ())
-
-    distance, radius = distances(line([0, 0, 0], [1, 0, 0], [1, 3]), line([0, 2, 0], [1, 2, 0], [5, 5]), 0.01)
+def test_distances_between_lines(curve):
+    distance, radius = distances(
+        curve([[0, 0, 0], [1, 0, 0]], radii=[1, 3]), curve([[0, 2, 0], [1, 2, 0]], radii=[5, 5]), 0.01
+    )
     np.testing.assert_allclose(distance, 2)
     np.testing.assert_allclose(radius, (5 + np.linspace(1.01, 2.99, 100)) / 2)
-    half, whole = line([0, 0, 0], [1, 0, 0], [1, 1]), line([0, 0, 0], [2, 0, 0], [1, 1])
+    half, whole = curve([[0, 0, 0], [1, 0, 0]], radii=1), curve([[0, 0, 0], [2, 0, 0]], radii=1)
     assert distances(half, whole, 0.001)[0].max() < 0.001
     assert distances(whole, half, 0.001)[0].mean() == pytest.approx(0.25, abs=0.001)
-    dots, other = line([0, 0, 0], [4, 0, 0], [0, 0], edges=()), line([0, 3, 0], [4, 3, 0], [0, 0])
+    dots, other = curve([[0, 0, 0], [4, 0, 0]], (), radii=0), curve([[0, 3, 0], [4, 3, 0]], radii=0)
     distance, radius = distances(dots, other, 0.1)
     np.testing.assert_allclose(distance, 3, rtol=1e-3)
     assert radius.tolist() == [0.1, 0.1]
@@ -223,32 +214,22 @@ def test_files_without_a_truth(ring, tmp_path, axis_of):
 
 
 def test_a_skeleton_in_other_units_is_told_before_the_memory_is_full(axis_of):
-    sample = torus(100)
-    far = axis_of(sample, shift=[0, 0, 0])
-    far = Skeleton(1e12 * far.vertices, far.edges, far.radii, (), (), ())
     with pytest.raises(InvalidParameterError, match=r"^the skeleton is .* long, too long for places .* apart"):
-        compare(far, sample)
+        compare(axis_of(torus(100), scale=1e12), torus(100))
 
 
 def test_two_skeletons_are_compared():
     one, other = (skeletonize(y_junction(1500, seed=seed).points) for seed in (0, 1))
-    found = compare(one, other)
-    assert found.perfect
-    assert found.error < 0.1
+    assert compare(one, other).perfect
+    assert compare(one, other).error < 0.1
     assert compare(one, one).error == 0
 
 
-@pytest.mark.parametrize(
-    "ask",
-    [
-        lambda cloud: compare(cloud, torus(100)),
-        branch_table,
-        segment,
-        annotate,
-        to_tubes,
-        to_line_set,
-    ],
-)
+EDITS = [editing.prune, editing.simplify, editing.reroot, editing.largest_component, editing.cut_loops]
+MEASURES = [lambda cloud: compare(cloud, torus(100)), branch_table, segment, annotate, to_tubes, to_line_set]
+
+
+@pytest.mark.parametrize("ask", [*MEASURES, *EDITS, lambda cloud: editing.detailed(cloud, limb=0.5)])
 def test_a_cloud_is_no_skeleton(ask):
     with pytest.raises(InvalidParameterError, match="a ndarray is no Skeleton: make one with skeletonize"):
         ask(np.zeros((9, 3)))

@@ -42,8 +42,6 @@ def by_place(grasps):
     return grasps[np.lexsort((*grasps.approach.round(6).T, *grasps.position.round(6).T))]
 
 
-# ---------------------------------------------------------------------------------------------------------------- walls
-
 WALL = sheet((-1, 1), 0.3, (-1.5, 1.5), 0.02)
 
 
@@ -63,8 +61,6 @@ def test_a_wall_keeps_away_exactly_what_comes_from_its_side(points, plane, why):
 def test_a_wall_and_a_table():
     both = grasp(rod(WALL), plane=(0, 0, 1, 0.3))
     assert both.left_out == {TOUCHING: 3 * both.places, BEHIND: 2 * both.places}  # a third one from below touches
-    assert both.approach[:, 1].min() > -1e-9
-    assert both.approach[:, 2].max() < 1e-9
 
 
 @pytest.mark.parametrize(("gap", "sides"), [(0.05 + CLEARANCE - 1e-3, 0), (0.05 + CLEARANCE + 1e-3, 2)])
@@ -91,9 +87,6 @@ def test_a_way_in_is_as_long_as_the_object():
     back = 0.05 - 0.3 - 0.2 - diagonal - CLEARANCE / 2  # where the palm comes from
     for height, places in ((-back + 0.01, 9), (-back - 0.01, 0)):
         assert sum(grasp(skeleton, plane=(0, 0, -1, height)).approach[:, 2] < -0.99) == places
-
-
-# --------------------------------------------------------------------------------------------------------------- points
 
 
 def test_turned_moved_scaled_and_shuffled():
@@ -166,15 +159,12 @@ def test_what_was_seen_is_told_and_ranks():
 
 def test_the_best_of_each_place_comes_before_the_second_best_of_any():
     sample = samples.sauropod(4000)
-    seen = sample.points[sample.points[:, 1] > -0.02]  # qualities differ also around a place
+    half = sample.points[sample.points[:, 1] > -0.02]  # qualities differ also around a place
     sure = np.linspace(0.6, 1, len(sample.radii))
-    axis = Skeleton(sample.nodes, sample.edges, sample.radii, (), seen, (), confidence=sure)
-    found = grasp_candidates(axis, 0.2)
-    assert found.quality[0] == found.quality.max()
-    places, place = np.unique(found.position, axis=0, return_inverse=True)
-    place = place.reshape(-1)
+    found = grasp_candidates(Skeleton(sample.nodes, sample.edges, sample.radii, (), half, (), confidence=sure), 0.2)
+    place = np.unique(found.position, axis=0, return_inverse=True)[1].reshape(-1)
     rank = np.array([np.sum(place[:row] == place[row]) for row in range(len(place))])
-    assert len(places) > 20
+    assert place.max() > 20
     assert len(set(found[rank == 0].seen)) > 1
     assert (np.diff(rank) >= 0).all()
     for group in (rank, place):  # the best of a round comes first, and the best of a place
@@ -201,9 +191,6 @@ def test_fingers_reach_as_far_as_the_part_and_no_farther_than_they_can():
     np.testing.assert_allclose(grasp(rod()).depth, HAND.reach)
 
 
-# --------------------------------------------------------------------------------------------------------------- errors
-
-
 @pytest.mark.parametrize(
     ("options", "error", "said"),
     [
@@ -227,12 +214,8 @@ def test_a_skeleton_without_points_asks_for_them():
     assert len(grasp(bare, cloud=(), plane=(0, 0, 1, 0.11))) < len(grasp(bare, cloud=()))
 
 
-# ------------------------------------------------------------------------------------------------------------- grippers
-
-
 def test_boxes_of_a_gripper():
     low, high = HAND.boxes([0.2, 0.3], [0.05, 0.01])
-    assert low.shape == high.shape == (2, 3, 3)
     np.testing.assert_allclose(low[0], [[-0.15, -0.03, -0.25], [0.1, -0.03, -0.25], [-0.25, -0.05, -0.45]])
     np.testing.assert_allclose(high[0], [[-0.1, 0.03, 0.05], [0.15, 0.03, 0.05], [0.25, 0.05, -0.25]])
     np.testing.assert_allclose((high - low)[0], (high - low)[1])

@@ -1,4 +1,4 @@
-"""Cylinders and measures of trees against tubes with known volumes."""
+"""Cylinders and measures of trees against tubes with known volumes, and circles through points of stems."""
 
 from dataclasses import asdict, replace
 
@@ -15,14 +15,16 @@ from glsk_o3d import (
     samples,
     save_skeleton,
 )
-from glsk_o3d.analysis import cylinders, tree_measures
+from glsk_o3d.analysis import branch_table, cylinders, tree_measures
+from glsk_o3d.analysis.forestry import fit_circle
 
+quiet = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
 Z = np.array([0, 0, 1.0])
 THICK, THIN, HEIGHT = 0.1, 0.05, 2.0
 VOLUME = np.pi * THICK**2 * (HEIGHT - THICK / 3), np.pi * THIN**2 * (1 - THICK - THIN / 3)
 
 
-def lateral(start, way, length, radius, n, rng):
+def limb(start, way, length, radius, n, rng):
     """Points on a tube with a round cap at its far end."""
     way = way / np.linalg.norm(way)
     across = np.linalg.svd(way[None])[2][1:]
@@ -38,7 +40,7 @@ def lateral(start, way, length, radius, n, rng):
 def tree(request):
     """A stem of two metres, and a branch to one side at half its height."""
     rng = np.random.default_rng(5)
-    stem, branch = lateral(0 * Z, Z, HEIGHT, THICK, 6000, rng), lateral(Z, np.array([1, 0, 0]), 1.0, THIN, 1500, rng)
+    stem, branch = limb(0 * Z, Z, HEIGHT, THICK, 6000, rng), limb(Z, np.array([1, 0, 0]), 1.0, THIN, 1500, rng)
     branch = branch[np.hypot(branch[:, 0], branch[:, 1]) > THICK]
     stem = stem[np.hypot(stem[:, 1], stem[:, 2] - 1) * (stem[:, 0] > 0) + (stem[:, 0] <= 0) > THIN]
     points = np.concatenate([stem, branch])
@@ -47,7 +49,7 @@ def tree(request):
 
 def by_hand(radius=0.5, edges=((0, 1), (1, 2), (1, 3))):
     places = np.array([[0, 0, 0], [0, 0, 10], [0, 0, 20], [10, 0, 10]], float)
-    return Skeleton(places, edges, np.full(4, radius), np.empty(0, int), np.empty((0, 3)), np.empty((0, 3)))
+    return Skeleton(places, edges, np.full(4, radius), (), (), ())
 
 
 def test_measures_of_a_tree(tree):
@@ -206,3 +208,147 @@ def test_volume_is_that_of_parts_with_a_surface():
     assert sum(half.volume) == pytest.approx(table.volume[table.confidence > 0].sum())
     assert sum(half.volume) < 0.7 * sum(whole.volume)
     assert half.traced == pytest.approx(0.4)  # one of ten cylinders has both
+
+
+def log(length, thin, ends, n, seed=0):
+    """Points of a log with radii 1 and `thin`, even by area, and its volume."""
+    rng = np.random.default_rng(seed)
+    radii = np.array([1.0, thin])
+    side = np.pi * radii.sum() * np.hypot(length, 1 - thin)
+    caps = {"flat": 1, "open": 0, "round": 2}[ends] * np.pi * radii**2
+    areas = np.array([side, *caps])
+    part, u, turn = rng.choice(3, n, p=areas / areas.sum()), rng.random(n), 2 * np.pi * rng.random(n)
+    radius = np.sqrt(1 + u * (thin**2 - 1))
+    height = length * ((1 - radius) / (1 - thin) if thin < 1 else u)
+    for k, (r, up, out) in enumerate(zip(radii, (0, length), (-1, 1), strict=True), 1):
+        cap = part == k
+        radius = np.where(cap, r * (np.sqrt(u) if ends == "flat" else np.sqrt(1 - u**2)), radius)
+        height = np.where(cap, up + (out * r * u if ends == "round" else 0), height)
+    volume = np.pi * length * (1 + thin + thin**2) / 3 + (2 / 3 * np.pi * (radii**3).sum() if ends == "round" else 0)
+    return np.column_stack([radius * np.cos(turn), radius * np.sin(turn), height]), volume
+
+
+@quiet
+@pytest.mark.parametrize("ends", ["flat", "open", "round"])
+@pytest.mark.parametrize("thin", [1.0, 0.7, 0.5])
+@pytest.mark.parametrize("length", [6, 10, 24])
+def test_the_volume_of_a_log(length, thin, ends):
+    points, volume = log(length, thin, ends, 3000)
+    assert cylinders(pipelines.tree()(points)).volume.sum() == pytest.approx(volume, rel=0.03)
+
+
+def flared(seed, lean=0.6, noise=0.0):
+    """A stem from z = 0.7 to 6.7 whose foot runs aside along a root, cut at that height."""
+    rng = np.random.default_rng(seed)
+    height, turn = 6 * rng.random(4000) ** 1.5, 2 * np.pi * rng.random(4000)
+    radius = 0.25 + 0.15 * np.exp(-height / 0.3)
+    aside = -lean * np.exp(-height / 0.4)
+    points = np.column_stack([aside + radius * np.cos(turn), radius * np.sin(turn), 0.7 + height])
+    return points + noise * rng.normal(size=points.shape)
+
+
+@quiet
+@pytest.mark.parametrize("lean", [0, 0.6, 1.0])
+@pytest.mark.parametrize("seed", range(2))
+def test_a_tree_begins_where_its_points_do(lean, seed):
+    points = flared(seed, lean)
+    skeleton = pipelines.tree()(points)
+    measures, table = tree_measures(skeleton), cylinders(skeleton)
+    assert measures.height == pytest.approx(np.ptp(points[:, 2]), abs=1e-9)
+    lowest = points[:, 2].min()
+    assert lowest - 1e-9 <= measures.root[2] <= lowest + 0.1
+    assert table.start_point[:, 2].min() >= lowest - 1e-9
+    assert measures.stem_diameter == pytest.approx(0.5, rel=0.05)
+
+
+@quiet
+def test_a_lying_stem_begins_where_it_did():
+    """Its lowest side says nothing of where it begins."""
+    points = log(10, 1.0, "flat", 3000)[0][:, [2, 0, 1]]
+    skeleton = pipelines.tree("x")(points)
+    for up in ("x", "z", "-z"):
+        assert cylinders(skeleton, up=up).start_point[0] == pytest.approx([0, 0, 0], abs=0.06)
+    assert tree_measures(skeleton, up="z").height == pytest.approx(2, abs=0.6)
+
+
+def beside(points, a, b):
+    """How far points are from the line between two places."""
+    share = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
+    return np.linalg.norm(points - a - share[:, None] * (b - a), axis=1)
+
+
+@quiet
+@pytest.mark.parametrize("degrees", [30, 40, 50, 60, 75])
+@pytest.mark.parametrize("thin", [0.3, 0.6, 1.0])
+def test_the_angle_of_a_branch_is_read_beyond_the_stem(thin, degrees):
+    rng, fork = np.random.default_rng(1), 9 * Z
+    way = np.array([np.sin(np.radians(degrees)), 0, np.cos(np.radians(degrees))])
+    stem, branch = limb(0 * Z, Z, 20, 1.0, 6000, rng), limb(fork, way, 10, thin, int(3000 * thin), rng)
+    stem = stem[beside(stem, fork, fork + (10 - thin) * way) > thin]
+    branch = branch[np.hypot(branch[:, 0], branch[:, 1]) > 1]
+    table = branch_table(pipelines.tree()(np.concatenate([stem, branch])))
+    lateral = np.flatnonzero(table.order == 1)
+    assert table.angle[lateral[table.length[lateral].argmax()]] == pytest.approx(degrees, abs=4)
+
+
+@quiet
+@pytest.mark.parametrize("seed", range(3))
+def test_twigs_of_single_points_have_cylinders_with_a_radius_and_some_length(seed):
+    """Most of a slice has one point, through which the curve runs."""
+    rng = np.random.default_rng(seed)
+    lines = [(0 * Z, 2 * Z), *((2 * Z, 2 * Z + 3 * np.array([np.cos(t), np.sin(t), 0.7])) for t in (0, 2, 4))]
+    points = np.concatenate([a + np.sort(rng.random((120, 1)), axis=0) * (b - a) for a, b in lines])
+    points += 0.01 * rng.normal(size=points.shape)
+    skeleton = pipelines.tree()(points)
+    assert skeleton.report.n_traced > 400
+    table = cylinders(skeleton)
+    assert table.radius.min() > 0.001
+    assert np.quantile(skeleton.radii, 0.9) < 0.03
+    assert np.bincount(table.branch).max() <= 60
+
+
+def arc(degrees, n, noise, rng, radius=1.0, centre=(5.0, 7.0)):
+    turn = np.radians(degrees) * (rng.random(n) - 0.5) + rng.uniform(0, 2 * np.pi)
+    wide = radius + noise * rng.normal(size=n)
+    return centre + wide[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
+
+
+@pytest.mark.parametrize("degrees", [360, 180, 90, 30])
+def test_points_on_a_circle(degrees):
+    fit = fit_circle(arc(degrees, 100, 0, np.random.default_rng(0), 0.2))
+    assert fit.radius == pytest.approx(0.2, rel=1e-9)
+    assert fit.arc == pytest.approx(degrees, abs=15)
+    assert fit.points == 100
+
+
+def test_outliers_do_not_move_a_circle():
+    rng = np.random.default_rng(1)
+    wood = arc(200, 120, 0, rng)
+    fit = fit_circle(np.concatenate([wood, wood.mean(axis=0) + rng.uniform(-3, 3, (60, 2))]))
+    assert fit.radius == pytest.approx(1, rel=0.01)
+    clump = wood.mean(axis=0) + [2, 0] + 0.1 * rng.normal(size=(80, 2))  # a shrub beside the stem
+    assert fit_circle(np.concatenate([wood, clump])).radius == pytest.approx(1, rel=1e-6)
+
+
+def test_a_few_points_on_the_other_side_have_no_say():
+    """They would weigh most: two twigs hardly off the circle, opposite to an arc of 120 degrees."""
+    rng = np.random.default_rng(4)
+    wood = arc(120, 60, 0.02, rng, centre=(0, 0))
+    middle = np.arctan2(*wood.mean(axis=0)[::-1])
+    twigs = 1.09 * np.array([[np.cos(middle + turn), np.sin(middle + turn)] for turn in (2.9, 3.1)])
+    alone, more = fit_circle(wood), fit_circle(np.concatenate([wood, twigs]))
+    assert more.radius == pytest.approx(alone.radius, rel=1e-6)
+    assert more.points == alone.points
+
+
+def test_the_arc_is_what_has_points():
+    rng = np.random.default_rng(2)
+    sides = [[np.cos(a), np.sin(a)] for a in np.radians(np.r_[np.arange(0, 91), np.arange(180, 241)])]
+    assert fit_circle(np.array(sides)).arc == pytest.approx(150, abs=1)
+    assert fit_circle(arc(360, 40, 0.01, rng)).arc > 300  # few points all around
+
+
+def test_there_may_be_no_circle():
+    line = np.column_stack([np.arange(50.0), 0 * np.arange(50.0)])
+    for points in (np.eye(3)[:, :2], np.empty((0, 2)), np.ones((20, 2)), line):
+        assert fit_circle(points) is None

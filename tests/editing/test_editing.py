@@ -40,9 +40,6 @@ def same_points(before, after):
     np.testing.assert_array_equal(after.vertex_of_point >= 0, before.vertex_of_point >= 0)
 
 
-# --------------------------------------------------------------------------------------------------------------- prune
-
-
 @pytest.mark.parametrize(("length", "leaves"), [(0, 5), (1, 5), (1.5, 4), (3.2, 2), (99, 2)])
 def test_short_branches_go_and_the_longest_way_stays(length, leaves):
     left = prune(comb(), length=length)
@@ -74,9 +71,6 @@ def test_what_cannot_be_pruned(ring):
         prune(ring, order=0)
 
 
-# ------------------------------------------------------------------------------------------------------------ simplify
-
-
 def test_a_straight_line_is_its_ends():
     line = graph([(x, 2 * x, 0) for x in range(50)], [(i, i + 1) for i in range(49)])
     left = simplify(line, tolerance=1e-9)
@@ -104,9 +98,6 @@ def test_loops_stay_and_a_ring_is_at_least_a_triangle(ring):
     places = [(0, 0, 0), (1, 0, 0), (2, 0, 0), (1, 1, 0), (1, -1, 0), (3, 0, 0), (4, 0, 0)]
     theta = graph(places, [(0, 1), (1, 2), (0, 3), (3, 2), (0, 4), (4, 2), (2, 5), (5, 6)])
     assert simplify(theta, tolerance=99).n_loops == theta.n_loops == 2
-
-
-# -------------------------------------------------------------------------------------------------------------- graphs
 
 
 def test_the_longest_component():
@@ -152,9 +143,6 @@ def test_what_has_no_root(ring):
         reroot(graph(np.empty((0, 3)), []), "x")
     with pytest.raises(InvalidParameterError, match="no radii"):
         reroot(replace(comb(), radii=np.full(14, np.nan)), "thickest")
-
-
-# ----------------------------------------------------------------------------------------------------------------- all
 
 
 @pytest.mark.parametrize(
