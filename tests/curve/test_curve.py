@@ -40,7 +40,9 @@ def others(thing):
             continue
         if field.name == "edges":
             yield field.name, value[::2]
-        elif field.name in ("normals", "neighbours", "supporting", "vertex_of_point", "representative_of_point"):
+        elif field.name == "representative_of_point":
+            yield field.name, np.where(np.arange(len(value)) % 3 == 0, -1, value)
+        elif field.name in ("normals", "neighbours", "supporting", "vertex_of_point"):
             yield field.name, np.concatenate([value[len(value) // 3 :], value[: len(value) // 3]])
         else:  # a half thickness may not be more than its half width
             yield field.name, value * (1.1 if field.name == "half_width" else rng.uniform(0.5, 1, value.shape))
