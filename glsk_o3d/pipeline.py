@@ -55,7 +55,8 @@ class RunContext:
         The ``report.iterations`` of the state end with the record of that iteration.
         """
         record = state.report.iterations[-1]
-        _log.debug(SOLVED, dataclasses.asdict(record))
+        if _log.isEnabledFor(logging.DEBUG):
+            _log.debug(SOLVED, dataclasses.asdict(record))
         if self.on_state is not None:
             self.on_state(deepcopy(state))  # what is done to it does not change the run
         answer = None if self.on_iteration is None else self.on_iteration(record)

@@ -133,15 +133,13 @@ def weights():
     return found
 
 
-THRESHOLDS = ("handle", "air", "bridge", "limb")
-"""Options that are probabilities."""
-
-
 def defaults():
     """The numbers that are defaults of options in `default`."""
     from glsk_o3d import pipelines
+    from glsk_o3d.data.decisions import WORDS
     from glsk_o3d.pipeline import parts
 
+    thresholds = {words.option for words in WORDS.values()}  # options that are probabilities
     published = {
         (type(part), field): value for part in parts(pipelines.wen2024()) for field, value in vars(part).items()
     }
@@ -151,7 +149,7 @@ def defaults():
             value = getattr(part, field.name)
             if re.fullmatch(r"[\d.e+-]+%?", str(value)) and type(value) is not bool:
                 where = "published" if published.get((type(part), field.name)) == value else "fitted"
-                if field.name in THRESHOLDS and value == 0.5:
+                if field.name in thresholds and value == 0.5:
                     where = "derived"  # where both answers are equally likely
                 found.append(Number(type(part).__name__, field.name, str(value), where, field.metadata["doc"]))
     return found

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ..data.derived import derived
+from ..data.derived import derived, fields_of
 from ..data.graph import Graph, in_order_of_ends
 from ..data.skeleton import Skeleton
 from .axis.sections import Sections, VertexPoints, measure_sections
@@ -20,11 +20,11 @@ class Curve(Graph):
     @classmethod
     def of(cls, skeleton: Skeleton) -> Curve:
         """The curve of a skeleton."""
-        return cls(**_fields(skeleton))
+        return cls(**fields_of(skeleton, Graph))
 
     def to_skeleton(self) -> Skeleton:
         """The finished skeleton, checked, every point of which represents itself."""
-        return Skeleton(**_fields(self) | dict(representative_of_point=None))
+        return Skeleton(**fields_of(self, Graph) | dict(representative_of_point=None))
 
     def rewired(self, edges: np.ndarray, **changes: Any) -> Curve:
         """The same with other edges, in any order, and other fields.
@@ -37,10 +37,6 @@ class Curve(Graph):
             changes = given | changes
         m = len(changes.get("vertices", self.vertices))
         return self.changed(edges=in_order_of_ends(edges, m), **changes)
-
-    def with_facts(self, **facts: Any) -> Curve:
-        """The same with other facts in its report."""
-        return self.changed(report=replace(self.report, **facts))
 
     def with_gaps(self, ends: np.ndarray) -> Curve:
         """The same with the ends, (g, 2, 3) float array, of more stretches that no point supports in its report."""
@@ -67,7 +63,3 @@ class Curve(Graph):
     def sections(self) -> Sections:
         """The sections of the object at its vertices."""
         return measure_sections(self, self.cloud)
-
-
-def _fields(graph: Graph) -> dict[str, Any]:
-    return {field.name: getattr(graph, field.name) for field in fields(Graph)}

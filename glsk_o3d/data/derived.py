@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -39,3 +39,8 @@ class Changeable:
             if isinstance(fact, Derived) and not set(fact.fields) & fields.keys():
                 vars(other)[name] = known[name]
         return other
+
+
+def fields_of(value: Any, cls: type[Any]) -> dict[str, Any]:
+    """The fields that a value has as an instance of a dataclass, for one that shares them."""
+    return {field.name: getattr(value, field.name) for field in fields(cls)}

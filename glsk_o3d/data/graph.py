@@ -11,8 +11,8 @@ from ..geometry.groups import component_labels
 from ..geometry.polylines import maximal_paths
 from ..geometry.radii import supporting_points
 from ..geometry.vectors import norm
-from .derived import Changeable, derived
-from .report import Report
+from .derived import derived
+from .report import Report, Reported
 
 AnyGraph = TypeVar("AnyGraph", bound="Graph")
 
@@ -21,7 +21,7 @@ OF_VERTICES = ("radii", "confidence", "half_width", "half_thickness", "support")
 
 
 @dataclass(frozen=True, eq=False)
-class Graph(Changeable):
+class Graph(Reported):
     """Vertices, edges, what is known of the vertices, and which points belong to each: see `Skeleton`."""
 
     vertices: np.ndarray

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -18,7 +18,7 @@ from ..geometry.numbers import fitted, speed
 from ..geometry.vectors import TINY, Ints, finite_rows
 from ..interop.clouds import cloud_counts, surface_mesh, to_point_cloud
 from .point_map import PointMap
-from .report import Report
+from .report import Report, Reported
 
 Working = TypeVar("Working", bound="WorkingCloud")
 
@@ -56,7 +56,7 @@ def default_size(n: int) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class WorkingCloud:
+class WorkingCloud(Reported):
     """What `Points` and `Contraction` have in common: a cloud in its working frame, and who represents whom.
 
     Arrays over the N input points are in the user's order and units. Everything else lives in the working frame: m
@@ -100,10 +100,6 @@ class WorkingCloud:
         if self.report.is_sampled or self.report.n_by_area:
             return self.map.sampled
         return (self.map.row_of_point >= 0) & ~self.outlier
-
-    def with_report(self: Working, report: Report) -> Working:
-        """The same with another record of the run."""
-        return replace(self, report=report)
 
     def merged_into(self: Working, into: np.ndarray, **changes: Any) -> Working:
         """The same with survivors merged `into` others (n,); one that stays is its own.
@@ -253,10 +249,6 @@ class Points(WorkingCloud):
         `changes` are other fields over the new rows.
         """
         return replace(self, map=self.map.moved(row, len(cloud)), **_measured(cloud, neighbours) | changes)
-
-    def common(self) -> dict[str, Any]:
-        """The fields of `WorkingCloud`, for the next state."""
-        return {field.name: getattr(self, field.name) for field in fields(WorkingCloud)}
 
 
 def _measured(cloud: np.ndarray, neighbours: np.ndarray) -> dict[str, Any]:

@@ -11,10 +11,13 @@ from dataclasses import dataclass, field
 from functools import cache
 from html import escape
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from ..errors import SkeletonWarning
 from .decisions import WORDS, Decision, Place, Supported
+from .derived import Changeable
+
+Flow = TypeVar("Flow", bound="Reported")
 
 NOT_CONTRACTED = "not contracted"
 STOPPED_BY_CALLER = "stopped by the caller"
@@ -256,3 +259,17 @@ class Report:
         if not isinstance(report.recipe.get("pipeline", []), list):
             raise ValueError("the recipe in its report has no list of stages")
         return report
+
+
+class Reported(Changeable):
+    """Base of what flows between filters, and carries the record of the run."""
+
+    report: Report
+
+    def with_report(self: Flow, report: Report) -> Flow:
+        """The same with another record of the run."""
+        return self.changed(report=report)
+
+    def with_facts(self: Flow, **facts: Any) -> Flow:
+        """The same with other facts in the record of the run."""
+        return self.with_report(dataclasses.replace(self.report, **facts))

@@ -93,12 +93,6 @@ class Skeleton(Graph):
     (1000,)
     """
 
-    vertices: np.ndarray
-    edges: np.ndarray
-    radii: np.ndarray
-    vertex_of_point: np.ndarray
-    points: np.ndarray
-    normals: np.ndarray
     report: Report = field(default_factory=Report)
     confidence: np.ndarray = None  # type: ignore[assignment]
     half_width: np.ndarray = None  # type: ignore[assignment]

@@ -132,7 +132,7 @@ class Contractor(Filter[Contraction, Contraction]):
                 return _finished(state, STOPPED_BY_CALLER)
             if reason is not None:
                 keep = self.keep_last or len(state.report.iterations) == 1
-                kept = state if keep else replace(before, report=state.report)
+                kept = state if keep else before.with_report(state.report)
                 return _finished(kept, reason, converged=True)
         return _finished(state, f"reached max_iterations = {self.max_iterations}")
 
@@ -223,7 +223,7 @@ def _record(state: Contraction, **facts: Any) -> Contraction:
         contraction_weight=state.contraction_weight,
         **facts,
     )
-    return _noted(state, iterations=(*done, record))
+    return state.with_facts(iterations=(*done, record))
 
 
 def _reduced(state: Contraction, reducer: Reducer, start: float) -> Contraction:
@@ -232,13 +232,8 @@ def _reduced(state: Contraction, reducer: Reducer, start: float) -> Contraction:
     *done, last = reduced.report.iterations
     last = replace(last, n_merged=len(state) - len(reduced), seconds=time.perf_counter() - start)
     report = RunContext(state.report).report_of(reduced.report)
-    return _noted(reduced.with_report(report), iterations=(*done, last))
+    return reduced.with_report(report).with_facts(iterations=(*done, last))
 
 
 def _finished(state: Contraction, reason: str, converged: bool = False) -> Contraction:
-    return _noted(state, stop_reason=reason, converged=converged)
-
-
-def _noted(state: Contraction, **facts: Any) -> Contraction:
-    """A state with other facts in its report."""
-    return replace(state, report=replace(state.report, **facts))
+    return state.with_facts(stop_reason=reason, converged=converged)

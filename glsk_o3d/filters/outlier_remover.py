@@ -1,6 +1,6 @@
 """OutlierRemover: points -> those that are no outliers, single points far from all others or clusters that float."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -76,13 +76,13 @@ class OutlierRemover(Filter[Points, Points]):
         mixed, doubtful = mixed_pixels(points, distance, factor)
         remaining, neighbours = inliers(cloud, weight, neighbours, distance, mixed, factor, MIN_POINTS)
         if doubtful:
-            points = replace(points, report=points.report.with_warning(MIXED_OR_TWIGS))
+            points = points.with_report(points.report.with_warning(MIXED_OR_TWIGS))
         if len(remaining) == len(points):
             return points
         gone = np.ones(len(points), bool)
         gone[remaining] = False
         rest = points.without(gone, neighbours)
-        return replace(rest, report=replace(rest.report, n_mixed=int(mixed.sum())))
+        return rest.with_facts(n_mixed=int(mixed.sum()))
 
 
 def inliers(

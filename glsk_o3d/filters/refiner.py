@@ -1,7 +1,7 @@
 """Refiner: raw graph -> one-dimensional, medial skeleton (Wen et al. 2024, section II-D)."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 from ..curve.axis.fit import fit_axis, pull_back_detached
@@ -21,7 +21,7 @@ from ..curve.topology.gaps import Gaps
 from ..curve.topology.loops import Loops
 from ..curve.topology.question import Question, ask
 from ..curve.topology.spurs import Limbs
-from ..data.decisions import Decision
+from ..data.decisions import WORDS, Decision
 from ..data.skeleton import Skeleton
 from ..parameters import documented, parameter
 from ..pipeline import Filter, RunContext
@@ -106,7 +106,7 @@ class Refiner(Filter[Skeleton, Skeleton]):
     def run(self, skeleton: Skeleton, context: RunContext) -> Skeleton:
         curve = Curve.of(skeleton)
         if not self.recentre:  # every point keeps its vertex
-            return on_points(self._refined, curve, along_a_morton_curve(curve)).to_skeleton()
+            return self._in_order(curve).to_skeleton()
         refined = on_points(self._in_order, curve, surface_sample(curve))
         return (without_detached_clumps(refined) if self.air and self.bridge else refined).to_skeleton()
 
@@ -134,19 +134,19 @@ class Refiner(Filter[Skeleton, Skeleton]):
 
     def after(self, question: Question, curve: Curve, surface: Surface) -> tuple[Curve, list[Decision]]:
         """A curve after a question was answered for all its parts, fitted anew if it was changed; and the decisions."""
-        changed, decisions = ask(question, curve, surface, getattr(self, question.option))
+        changed, decisions = ask(question, curve, surface, self._least(question.about))
         return (curve if changed is curve else self._centred(changed, surface)), decisions
 
     def _decided(self, curve: Curve, surface: Surface) -> tuple[Curve, Surface, Deferred | None]:
         """Answer one question after the other; not again where the graph is the same, or has no more loops."""
         curve, surface, deferred = self._without_deferred(curve, surface)
-        decisions: dict[str, list[Decision]] = {question.about: [] for question in (Loops, Limbs, FalseBranches, Gaps)}
+        decisions: dict[str, list[Decision]] = {question.about: [] for question in QUESTIONS}
         answered: dict[str, Curve] = {}  # what each question was last asked about
         n_handles = 0
         for question in QUESTIONS:
             n_handles = min(n_handles, curve.n_loops)  # cuts may have opened some
             about = question.about
-            if not getattr(self, question.option) or answered.get(about) is curve or not _may_be_asked(curve):
+            if not self._least(about) or answered.get(about) is curve or not _may_be_asked(curve):
                 continue
             if question is Loops and curve.n_loops <= n_handles:
                 continue
@@ -158,14 +158,18 @@ class Refiner(Filter[Skeleton, Skeleton]):
                 if deferred is None:  # loops may have hidden that a part has no surface
                     curve, surface, deferred = self._without_deferred(curve, surface)
         counts = {about: len(_changes(found)) for about, found in decisions.items()}
-        report = replace(
-            curve.report,
+        curve = curve.with_facts(
             decisions=tuple(decision for about in decisions.values() for decision in about),
             n_loops_closed=counts["loop"],
             n_cuts=counts["air"],
             n_bridges=counts["gap"],
         )
-        return curve.changed(report=report), surface, deferred
+        return curve, surface, deferred
+
+    def _least(self, about: str) -> float:
+        """The probability that decides a question."""
+        probability: float = getattr(self, WORDS[about].option)
+        return probability
 
     def _without_deferred(self, curve: Curve, surface: Surface) -> tuple[Curve, Surface, Deferred | None]:
         """The curve without parts that are left to a Tracer, and the surface around it."""

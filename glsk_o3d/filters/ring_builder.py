@@ -6,7 +6,8 @@ from typing import Literal
 import numpy as np
 
 from ..data.contraction import Contraction, at_rest
-from ..data.points import Points
+from ..data.derived import fields_of
+from ..data.points import Points, WorkingCloud
 from ..errors import InvalidParameterError
 from ..geometry.neighbourhoods import nearest_neighbours, plane_axes, principal
 from ..geometry.rings import star_rings
@@ -87,7 +88,7 @@ class RingBuilder(Filter[Points, Contraction]):
         )
         mass = np.bincount(points.map.survivor_of_row, points.merged) * (n / points.merged.sum())
         known = dict(report=report, mass=mass, thinned=points.survivors)
-        return Contraction(**(points.common() | known | at_rest(cloud, rings)))
+        return Contraction(**(fields_of(points, WorkingCloud) | known | at_rest(cloud, rings)))
 
     def neighbourhoods(self, points: Points, cloud: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The neighbours of every point but itself, (n, k - 1), and the unit normals of their planes, (n, 3)."""

@@ -1,6 +1,6 @@
 """Sampler: cloud -> points in a working frame, of a large cloud a sample."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 from ..data.points import Points, default_size
@@ -61,7 +61,7 @@ class Sampler(Filter[Cloud, Points]):
         if isinstance(self.sample, str) or points.report.n_by_area:
             return points
         warning = f"Sampler.sample = {self.sample}: the cloud has no triangles with an area: its points are taken"
-        return replace(points, report=points.report.with_warning(warning))
+        return points.with_report(points.report.with_warning(warning))
 
     def sample_size(self, n: int) -> int:
         """Size of the sample of n points if n is more than twice as large."""

@@ -6,7 +6,7 @@ from typing import Any
 
 
 def _number(value: Any, doc: str, origin: str) -> Any:
-    return dataclasses.field(default_factory=lambda: value, metadata=dict(origin=origin, doc=doc))
+    return dataclasses.field(default=value, metadata=dict(origin=origin, doc=doc))
 
 
 published, derived, measured, fitted = (

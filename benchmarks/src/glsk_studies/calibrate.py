@@ -237,7 +237,7 @@ def fit(
     jobs: Jobs = 2,
     output: Output = None,
 ) -> None:
-    """The weights with which the questions are answered best, as glsk_o3d/decisions.py has them."""
+    """The weights with which the questions are answered best, as the classes of the questions have them."""
     rows = rows_of(sources, own, variant, shapes, jobs)
     save(output, rows)
     for about, answered in by_question(rows).items():

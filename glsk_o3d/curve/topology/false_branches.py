@@ -43,7 +43,7 @@ class FalseBranches(Question):
     The curve was fitted to its axis. There is one decision for each branch.
     """
 
-    about, option, repeats = "air", "air", False
+    about, repeats = "air", False
     weights: ClassVar[Mapping[str, float]] = dict(  # fitted
         constant=-5.8, deficit=1.7, surface=-0.5, straightness=-3.2, noise=1.9, bonds=-0.9, inner=3.4, length=-0.5
     )

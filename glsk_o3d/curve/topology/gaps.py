@@ -49,7 +49,7 @@ class Gaps(Question):
     The surest are bridged first. There is one decision for each end that points at something, of its likeliest bridge.
     """
 
-    about, option, repeats = "gap", "bridge", False
+    about, repeats = "gap", False
     weights: ClassVar[Mapping[str, float]] = dict(constant=-1.7, winding=3.7, cap=-1.2)  # fitted
 
     def candidates(self, evidence: Evidence, least: float) -> list[Candidate]:

@@ -52,7 +52,7 @@ class Loops(Question):
     loop that was closed, and for each of the minimum cycle basis that remains.
     """
 
-    about, option, repeats = "loop", "handle", True
+    about, repeats = "loop", True
     weights: ClassVar[Mapping[str, float]] = dict(constant=-0.3, opening=1.5, passage=4.5, bonds=2.4)  # fitted
 
     def __init__(self) -> None:

@@ -39,7 +39,6 @@ class Question:
     """
 
     about: ClassVar[str]  # as in `Decision`
-    option: ClassVar[str]  # of the Refiner: the probability that decides
     weights: ClassVar[Mapping[str, float]]  # of the facts, and of a constant
     repeats: ClassVar[bool]  # whether it is asked again of a changed curve
 

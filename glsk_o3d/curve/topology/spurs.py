@@ -52,13 +52,14 @@ class Limbs(Question):
     There is one decision for each branch, cut or not; at its end.
     """
 
-    about, option, repeats = "limb", "limb", True
+    about, repeats = "limb", True
     weights: ClassVar[Mapping[str, float]] = dict(  # fitted
         constant=-3.0, protrusion=3.2, certainty=1.8, slenderness=1.0
     )
 
     def __init__(self) -> None:
-        self._known, self._mute = Memo[dict[str, float]](), np.zeros(0, bool)
+        self._known = Memo[dict[str, float]]()
+        self._mute = np.array(False)  # points that say nothing any more, of all
 
     def candidates(self, evidence: Evidence, least: float) -> list[Candidate]:
         """One for each branch that leaves a junction and ends; its facts are known from before others were cut.
@@ -68,7 +69,9 @@ class Limbs(Question):
         left out that has the object beside it; how certain it is, minus the logarithm of what its mean confidence lacks
         of 1; and how slender, minus the logarithm of its radius over the distance of the surface from the junction.
         """
-        curve = self._with_mute_points(evidence.curve)
+        curve = evidence.curve
+        if self._mute.any():
+            curve = curve.changed(normals=np.where(self._mute[:, None], np.nan, curve.normals))
         limbs, degree = JunctionLimbs(curve), curve.degree
         paths = enumerate(branch[::-1] if degree[branch[0]] == 1 else branch for branch in limbs.branches)
         asked = [(k, path) for k, path in paths if degree[path[0]] > 2 and degree[path[-1]] == 1]
@@ -91,15 +94,8 @@ class Limbs(Question):
         curve, group = evidence.curve, np.arange(len(evidence.curve.vertices))
         for path in (candidate.part for candidate in chosen):
             group[path[1:]] = path[0]
-        self._mute = np.isin(curve.vertex_of_point, np.flatnonzero(group != np.arange(len(group)))) | self._muted(curve)
+        self._mute = self._mute | np.isin(curve.vertex_of_point, np.flatnonzero(group != np.arange(len(group))))
         return merge_into(curve, group)
-
-    def _muted(self, curve: Curve) -> np.ndarray:
-        return self._mute if len(self._mute) else np.zeros(len(curve.points), bool)
-
-    def _with_mute_points(self, curve: Curve) -> Curve:
-        mute = self._muted(curve)
-        return curve.changed(normals=np.where(mute[:, None], np.nan, curve.normals)) if mute.any() else curve
 
 
 def limb_candidate(
