@@ -39,7 +39,7 @@ def parameter(
         One sentence; it appears in the class's docstring and in ``glsk filters``.
     type : {"int", "float", "bool", "length", "point", "choice", "reducer", "stop"}, optional
         By default that of `default`, of a string "choice". A length is a float in the cloud's units or a string such
-        as ``"2%"`` of the diagonal of the box that `Sampler.frame` names, a point a string such as ``"0.5,0,2"``.
+        as ``"2%"`` of the diagonal of the box that `Sampler.frame` names, a point ``(0.5, 0, 2)`` or ``"0.5,0,2"``.
         A trailing ``?`` allows None.
     unit : str
     low, high : float, optional
@@ -140,6 +140,8 @@ def _plain(value: Any) -> Any:
         return NONE
     if isinstance(value, Parameters):
         return value.table()
+    if isinstance(value, tuple) and resolve_point(value):
+        return ",".join(map(repr, map(float, value)))
     plain_types: tuple[tuple[type, Any], ...] = ((str, str.__str__), (bool, bool), (Integral, int), (Real, float))
     for kind, plain in plain_types:
         if isinstance(value, kind):
@@ -169,7 +171,7 @@ def problem_with(value: Any, facts: Any) -> str | None:
         return f"must be one of {listed}"
     if kind == "point":
         words = f"{listed} or " if choices else ""
-        return None if isinstance(value, str) and resolve_point(value) else f"must be {words}a point such as '0.5,0,2'"
+        return None if resolve_point(value) else f"must be {words}a point such as '0.5,0,2' or (0.5, 0, 2)"
     if kind in ("reducer", "stop"):
         usable = callable(value) and not isinstance(value, type)
         return None if usable else f"must be a {kind}: an instance, not a class or a name"
@@ -208,11 +210,13 @@ def _problem_with_number(value: Any, whole: bool, facts: Any) -> str | None:
     return f"must be at most {high}" if high is not None and number > high else None
 
 
-def resolve_point(text: str) -> tuple[float, ...] | None:
-    """A point (x, y, z) written as ``"x,y,z"``; None if it is none."""
+def resolve_point(point: Any) -> tuple[float, ...] | None:
+    """A point (x, y, z), a tuple or written as ``"x,y,z"``; None if it is none."""
+    if not isinstance(point, str | tuple):
+        return None
     try:
-        numbers = tuple(map(float, text.split(",")))
-    except ValueError:
+        numbers = tuple(map(float, point.split(",") if isinstance(point, str) else point))
+    except (TypeError, ValueError, OverflowError):
         return None
     return numbers if len(numbers) == 3 and all(abs(number) <= LARGEST for number in numbers) else None
 

@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from .curve.numbers import CURVE
 from .data.contraction import Contraction
 from .data.skeleton import Skeleton
@@ -89,7 +91,9 @@ def tree(root: str | Any = "z") -> Pipeline[Cloud, Skeleton]:
     >>> grown.n_components, grown.n_loops, len(grown.leaves)
     (1, 0, 3)
     """
-    return _graph() | Refiner(handle=1) | Tracer(root=root)
+    if isinstance(root, np.ndarray):
+        root = root.tolist()
+    return _graph() | Refiner(handle=1) | Tracer(root=tuple(root) if isinstance(root, list) else root)
 
 
 def _graph() -> Pipeline[Cloud, Skeleton]:

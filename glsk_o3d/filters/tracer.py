@@ -1,11 +1,6 @@
 """Tracer: thin parts without a surface -> shortest paths, and one rooted tree."""
 
-from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
-
 from ..curve.curve import Curve
 from ..curve.diagnostics import measured
 from ..curve.sampling import along_a_morton_curve, on_points
@@ -50,22 +45,13 @@ class Tracer(Filter[Skeleton, Skeleton]):
         low=0,
         high=1,
     )
-    root: str | Any = parameter(
+    root: str | tuple[float, float, float] | None = parameter(
         None,
         "Root of one tree: the lowest place along an axis, the thickest end, or the place nearest to a point. "
         "None keeps parts and loops.",
         type="point?",
         choices=(*AXES, "thickest"),
     )
-
-    def __post_init__(self) -> None:
-        # as plain text it can be compared, printed and written to files
-        if not isinstance(self.root, str | None):
-            with suppress(TypeError, ValueError, OverflowError):  # the check finds what is no point
-                point = np.asarray(self.root, float)
-                if point.shape == (3,):
-                    object.__setattr__(self, "root", ",".join(map(repr, point.tolist())))
-        super().__post_init__()
 
     def run(self, skeleton: Skeleton, context: RunContext) -> Skeleton:
         curve = Curve.of(skeleton)

@@ -18,7 +18,7 @@ from ...geometry.polylines import incident_edges, nearest_on_edges, places_on_ed
 from ...geometry.vectors import dot, norm, unit
 from ..curve import Curve
 from ..merging import merge_into
-from ..rooted import numbered_from, root_among
+from ..rooted import RootPlace, numbered_from, root_among
 from .detect import THIN, SpacedPoints, mostly_on_loops, without_detached_clumps, without_surface
 
 
@@ -37,7 +37,7 @@ class TraceNumbers:
 TRACE = TraceNumbers()
 
 
-def trace(curve: Curve, surface: float, root: str | None) -> Curve:
+def trace(curve: Curve, surface: float, root: RootPlace | None) -> Curve:
     """Replace what has no surface by shortest paths through its points; with a root make one tree of everything.
 
     Points are linked with near ones (`near_links`), and with the vertices of parts that have a surface. From a root a
