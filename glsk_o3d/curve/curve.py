@@ -33,8 +33,8 @@ class Curve(Graph):
         """
         if "vertices" in changes:
             radii, unknown = changes["radii"], np.full(len(changes["vertices"]), np.nan)
-            given = dict(half_width=radii, half_thickness=radii, confidence=unknown, support=unknown)
-            changes = given | changes
+            unknown_fields = dict(half_width=radii, half_thickness=radii, confidence=unknown, support=unknown)
+            changes = unknown_fields | changes
         m = len(changes.get("vertices", self.vertices))
         return self.changed(edges=in_order_of_ends(edges, m), **changes)
 

@@ -71,34 +71,34 @@ def pruning_order(limbs: Limbs) -> Iterator[tuple[Decision, float, list[int]]]:
     one of those beyond the junction is, 1 - prod (1 - p), of which only those more probable than not count.
     """
     branches = dict(enumerate(path for path, _ in maximal_paths(len(limbs.vertices), limbs.edges)))
-    at = defaultdict[int, list[int]](list)
+    limbs_at = defaultdict[int, list[int]](list)
     for number, path in branches.items():
-        at[path[0]].append(number)
-        at[path[-1]].append(number)
+        limbs_at[path[0]].append(number)
+        limbs_at[path[-1]].append(number)
     chance = {tip: limb.probability for tip, limb in limbs.judged.items()}
-    waiting, none = [(each, tip) for tip, each in chance.items()], defaultdict[int, float](lambda: 1.0)
+    waiting, none = [(probability, tip) for tip, probability in chance.items()], defaultdict[int, float](lambda: 1.0)
     heapq.heapify(waiting)
     while waiting:
         before, tip = heapq.heappop(waiting)
         if before < chance[tip]:
             heapq.heappush(waiting, (chance[tip], tip))
             continue
-        number = at[tip][0]
+        number = limbs_at[tip][0]
         path = branches[number] if branches[number][-1] == tip else branches[number][::-1]
         junction = path[0]
-        if len(at[junction]) < 3:
+        if len(limbs_at[junction]) < 3:
             continue
         yield limbs.judged[tip], chance[tip], path
-        at[junction].remove(number)
+        limbs_at[junction].remove(number)
         if chance[tip] > DETAIL.even:  # others were mostly gone when the rest was judged
             none[junction] *= 1 - chance[tip]
-        if len(at[junction]) == 2 and at[junction][0] != at[junction][1]:
-            one, other = at.pop(junction)
+        if len(limbs_at[junction]) == 2 and limbs_at[junction][0] != limbs_at[junction][1]:
+            one, other = limbs_at.pop(junction)
             first, second = branches[one], branches.pop(other)
             first = first if first[-1] == junction else first[::-1]
             second = second if second[0] == junction else second[::-1]
             branches[one] = first + second[1:]
-            at[second[-1]][at[second[-1]].index(other)] = one
+            limbs_at[second[-1]][limbs_at[second[-1]].index(other)] = one
             for end in (first[0], second[-1]):
                 if end in chance:
                     chance[end] = 1 - (1 - chance[end]) * none[junction]
@@ -112,7 +112,7 @@ def with_limbs(skeleton: Skeleton, least: float) -> Skeleton:
     """
     limbs, m = all_limbs(skeleton), len(skeleton.vertices)
     into, gone = np.arange(len(limbs.vertices)), dict[Decision, tuple[float, list[int]]]()
-    for limb, chance, path in takewhile(lambda each: each[1] < least, pruning_order(limbs)):
+    for limb, chance, path in takewhile(lambda entry: entry[1] < least, pruning_order(limbs)):
         into[path[1:]] = path[0]
         gone[limb] = chance, path
     stays = into == np.arange(len(into))
@@ -130,9 +130,9 @@ def with_limbs(skeleton: Skeleton, least: float) -> Skeleton:
     for name in ("radii", "half_width", "half_thickness"):
         known[name][m:] = limbs.radii[m:]
     decisions, back = [], {limb for limb in limbs.judged.values() if limb.changed} - set(gone)
-    for each in skeleton.report.decisions:
-        if each.changed or each not in gone:
-            decisions.append(replace(each, changed=False, branch=(), radii=()) if each in back else each)
+    for decision in skeleton.report.decisions:
+        if decision.changed or decision not in gone:
+            decisions.append(replace(decision, changed=False, branch=(), radii=()) if decision in back else decision)
     decisions += [
         limb_candidate(limbs.vertices, limbs.radii, np.array(path), {}, chance, True).decision("limb")
         for limb, (chance, path) in gone.items()
@@ -153,7 +153,7 @@ def _judged_ends(skeleton: Skeleton) -> dict[int, Decision]:
 
     Ends have moved since: the nearest decisions and ends belong together. The root of a tree is no limb's end.
     """
-    kept = [it for it in skeleton.report.decisions if it.about == "limb" and not it.changed]
+    kept = [decision for decision in skeleton.report.decisions if decision.about == "limb" and not decision.changed]
     reach: dict[int, float] = {}
     for path in skeleton.branches:
         path = path if skeleton.degree[path[-1]] == 1 else path[::-1]
@@ -166,12 +166,14 @@ def _judged_ends(skeleton: Skeleton) -> dict[int, Decision]:
         return {}
     tips = list(reach)
     near = min(DETAIL.tips, len(tips))
-    distance, nearest = cKDTree(skeleton.vertices[tips]).query([it.place for it in kept], range(1, near + 1))
-    found: dict[int, Decision] = {}
+    distance, nearest = cKDTree(skeleton.vertices[tips]).query(
+        [decision.place for decision in kept], range(1, near + 1)
+    )
+    decision_of_tip: dict[int, Decision] = {}
     free = set(range(len(kept)))
     for pair in np.argsort(distance, axis=None, kind="stable").tolist():
         k, tip = pair // near, tips[nearest.flat[pair]]
-        if k in free and tip not in found and distance.flat[pair] <= reach[tip]:
-            found[tip] = kept[k]
+        if k in free and tip not in decision_of_tip and distance.flat[pair] <= reach[tip]:
+            decision_of_tip[tip] = kept[k]
             free.discard(k)
-    return found
+    return decision_of_tip

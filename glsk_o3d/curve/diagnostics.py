@@ -105,10 +105,10 @@ def diagnose(curve: Curve) -> list[str]:
 
 
 def _close_calls(curve: Curve) -> list[str]:
-    close = [it for it in curve.report.uncertain if it.about != "limb"]
+    close = [decision for decision in curve.report.uncertain if decision.about != "limb"]
     if not close:
         return []
-    asked = sum(it.about != "limb" for it in curve.report.decisions)
+    asked = sum(decision.about != "limb" for decision in curve.report.decisions)
     return [
         f"uncertain topology: {len(close)} of {asked} questions about loops, air and gaps were close calls, above all "
         f"whether {close[0].question} (probability {close[0].probability:.2f}): look there; "

@@ -18,7 +18,7 @@ class Line(NamedTuple):
     """What a limb says of where it comes from."""
 
     middle: np.ndarray  # (3,) of the part that nothing disturbs
-    way: np.ndarray  # (3,) unit vector towards the junction, or zero
+    direction: np.ndarray  # (3,) unit vector towards the junction, or zero
     spread: float  # standard deviation along the line of that part
     bend: float  # root mean square distance from the line
     start: float  # length along the limb that is disturbed
@@ -69,7 +69,7 @@ class JunctionLimbs:
     def signature(self, junction: int) -> bytes:
         """What is equal of two junctions if their limbs are: what was found out about one is known of the other."""
         paths = [self.paths[limb] for limb in self.at[junction]]
-        return b"".join(each[path].tobytes() for path in paths for each in (self.vertices, self.surface))
+        return b"".join(values[path].tobytes() for path in paths for values in (self.vertices, self.surface))
 
     def _axis(self, limb: int) -> tuple[np.ndarray, np.ndarray]:
         """The last undisturbed place of a limb, and its direction there, towards the junction."""

@@ -29,7 +29,7 @@ def root_among(places: np.ndarray, graph: Graph, which: RootPlace, thick: np.nda
         return int(along_axis(places, which).argmin())
     if isinstance(which, str) and which == "thickest":
         choices = (thick if thick is not None else (), graph.leaves, np.arange(len(graph.vertices)))
-        ends = next(each for each in choices if len(each))
+        ends = next(candidates for candidates in choices if len(candidates))
         if np.isnan(graph.radii[ends]).any():
             raise InvalidParameterError("root = 'thickest': the skeleton has no radii, as of a format without them")
         place = graph.vertices[ends[graph.radii[ends].argmax()]]
@@ -54,7 +54,7 @@ def numbered_from(graph: AnyGraph, root: int) -> AnyGraph:
     nearest = np.argsort(norm(graph.vertices - graph.vertices[root]), kind="stable")
     starts = nearest[np.sort(np.unique(part[nearest], return_index=True)[1])].tolist()
     starts[0] = root  # of several vertices in one place
-    order = np.concatenate([breadth_first_order(links, at, False, return_predecessors=False) for at in starts])
+    order = np.concatenate([breadth_first_order(links, start, False, return_predecessors=False) for start in starts])
     index, vertex = np.argsort(order), graph.vertex_of_point
     return graph.changed(
         **all_of_vertices(graph, order),

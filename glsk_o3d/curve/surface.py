@@ -152,7 +152,7 @@ class Evidence:
         p, q = np.repeat(np.arange(len(vertex)), neighbours.shape[1]), neighbours.ravel()
         a, b = vertex[p], vertex[q]
         foreign = np.flatnonzero(a != b)
-        p, q, a, b = (each.take(foreign) for each in (p, q, a, b))
+        p, q, a, b = (values.take(foreign) for values in (p, q, a, b))
         agree = dot(surface.normals.take(p, axis=0), surface.normals.take(q, axis=0)) ** 2
         weight = agree * uprightness(surface.points, surface.normals, p, q)
         keys = np.minimum(a, b) * m + np.maximum(a, b)

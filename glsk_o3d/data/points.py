@@ -176,14 +176,17 @@ class Points(WorkingCloud):
         if not (drop or finite.all()):
             raise not_finite(int((~finite).sum()), len(points), int(finite.argmin()))
         counts, n, dropped = cloud_counts(cloud, finite)
-        given = points if finite.all() else points[finite]
+        finite_points = points if finite.all() else points[finite]
         surface = on_surface(mesh, sample)[0]
         if len(surface):
             kept, position, counts = sample_cloud(surface, size(len(surface)))
-            kept, position = kept + len(given), np.append(position[cKDTree(surface).query(given)[1]], position)
+            kept, position = (
+                kept + len(finite_points),
+                np.append(position[cKDTree(surface).query(finite_points)[1]], position),
+            )
             points, finite = np.append(points, surface, axis=0), np.append(finite, np.ones(len(surface), bool))
         else:
-            kept, position, counts = sample_cloud(given, size(n), counts)
+            kept, position, counts = sample_cloud(finite_points, size(n), counts)
         kept, place = np.flatnonzero(finite)[kept], np.full(len(points), -1)
         place[finite] = position
         report = Report(n_input=n + dropped, n_dropped=dropped, n_by_area=len(surface), n_sampled=len(kept))

@@ -70,14 +70,14 @@ def _read(value: Any, hint: Any, name: str = "it") -> Any:
     kind, inner = get_origin(hint) or hint, get_args(hint)
     if dataclasses.is_dataclass(kind) and isinstance(value, Mapping):
         hints = get_type_hints(kind)
-        known: Any = {key: _read(each, hints[key], key) for key, each in value.items() if key in hints}
+        known: Any = {key: _read(entry, hints[key], key) for key, entry in value.items() if key in hints}
         return kind(**known)  # type: ignore[operator]
     elif kind is tuple and isinstance(value, list | tuple):
         items = inner[:1] * len(value) if Ellipsis in inner else inner
         if len(value) == len(items):
-            return tuple(_read(each, item, name) for each, item in zip(value, items, strict=True))
+            return tuple(_read(entry, item, name) for entry, item in zip(value, items, strict=True))
     elif kind is dict and isinstance(value, dict):
-        return {key: _read(each, inner[1], name) for key, each in value.items()}
+        return {key: _read(entry, inner[1], name) for key, entry in value.items()}
     elif kind in (int, float):  # whole numbers that are not too large are floats, too
         if (type(value) is int and abs(value) <= sys.maxsize) or (kind is float and isinstance(value, float)):
             return value
@@ -201,14 +201,14 @@ class Report:
 
     def __str__(self) -> str:
         """What there is to say, in about ten lines; ``repr`` has it all."""
-        return "\n".join(["Report", *(f"{name:11} {words}".rstrip() for name, words in self._told())])
+        return "\n".join(["Report", *(f"{name:11} {words}".rstrip() for name, words in self._lines())])
 
     def _repr_html_(self) -> Markup:
         cell = '<td style="text-align:left;padding:2px 10px">{}</td>'  # not every notebook has Jupyter's sheet
-        rows = [markup("<tr>{}</tr>", [markup(cell, text) for text in row]) for row in self._told()]
+        rows = [markup("<tr>{}</tr>", [markup(cell, text) for text in row]) for row in self._lines()]
         return markup('<table style="font:13px/1.5 system-ui,sans-serif;border-collapse:collapse">{}</table>', rows)
 
-    def _told(self) -> list[tuple[str, str]]:
+    def _lines(self) -> list[tuple[str, str]]:
         """The lines, each as a name and what there is to say of it; the warnings come last."""
         counts = {name[2:].replace("_", " "): value for name, value in vars(self).items() if name.startswith("n_")}
         return [
@@ -216,11 +216,11 @@ class Report:
             ("counts", ", ".join(f"{value} {name}" for name, value in counts.items() if value)),
             ("noise", f"{self.noise:.2f}"),
             ("decisions", f"{len(self.decisions)}, {len(self.uncertain)} of them uncertain"),
-            *(("uncertain", str(each)) for each in self.uncertain[:1]),
-            *(("unsupported", str(each)) for each in self.unsupported[:1]),
+            *(("uncertain", str(part)) for part in self.uncertain[:1]),
+            *(("unsupported", str(part)) for part in self.unsupported[:1]),
             ("seconds", ", ".join(f"{name} {value:.2f}" for name, value in self.seconds.items())),
             ("versions", ", ".join(map(" ".join, self.versions.items()))),
-            *(("warning", each) for each in self.warnings),
+            *(("warning", part) for part in self.warnings),
         ]
 
     def with_warning(self, message: str) -> Report:
@@ -235,12 +235,19 @@ class Report:
     @property
     def uncertain(self) -> tuple[Decision, ...]:
         """Decisions with a probability between a quarter and three quarters, the least certain first."""
-        return tuple(sorted((it for it in self.decisions if it.is_uncertain), key=lambda it: abs(it.probability - 0.5)))
+        return tuple(
+            sorted(
+                (decision for decision in self.decisions if decision.is_uncertain),
+                key=lambda decision: abs(decision.probability - 0.5),
+            )
+        )
 
     @property
     def unsupported(self) -> tuple[Supported, ...]:
         """Parts that more than a fifth of the samples contradict, the most doubtful first."""
-        return tuple(sorted((it for it in self.support if not it.is_well_supported), key=lambda it: -it.doubt))
+        return tuple(
+            sorted((part for part in self.support if not part.is_well_supported), key=lambda part: -part.doubt)
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Plain dict of numbers, strings, lists and dicts, as saved in JSON."""

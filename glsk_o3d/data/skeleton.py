@@ -181,12 +181,12 @@ def of_input(skeleton: Skeleton) -> Skeleton:
     n, report = len(skeleton.points), skeleton.report
     if not report.n_by_area or n != report.n_input + report.n_by_area:
         return skeleton
-    given = skeleton.changed(
+    of_given_points = skeleton.changed(
         **{name: getattr(skeleton, name)[: report.n_input] for name in ("points", "normals", "vertex_of_point")},
         representative_of_point=None,
     )
-    vars(given)["_whole"] = skeleton
-    return given
+    vars(of_given_points)["_whole"] = skeleton
+    return of_given_points
 
 
 def as_color(color: Any, words: str) -> np.ndarray:
@@ -204,9 +204,9 @@ def _complete(skeleton: Skeleton) -> None:
     """Make all fields arrays, and fill in those without rows; InvalidParameterError where that cannot be."""
     arrays: dict[str, np.ndarray] = {}
     for name, (columns, kind) in ARRAYS.items():
-        given = getattr(skeleton, name)
+        values = getattr(skeleton, name)
         try:
-            array = np.asarray(() if given is None else given)
+            array = np.asarray(() if values is None else values)
         except (TypeError, ValueError) as error:  # rows of unequal length, and what else
             raise InvalidParameterError(f"{name}: is no array: {brief(error)}") from None
         unknown = name == "representative_of_point" and (array == -1).all()
@@ -217,11 +217,11 @@ def _complete(skeleton: Skeleton) -> None:
         arrays[name] = array.astype(kind, copy=False)
     for name in (*OF_VERTICES, "vertex_of_point", "normals", "representative_of_point"):
         owner = "vertices" if name in OF_VERTICES else "points"
-        given, wanted = arrays[name], len(arrays[owner])
-        if len(given) not in (0, wanted):
-            raise InvalidParameterError(f"{name}: has {len(given)} rows for {wanted} {owner}")
-        if len(given) < wanted:
-            unknown = np.full((wanted, *given.shape[1:]), np.nan if given.dtype == float else -1)
+        values, wanted = arrays[name], len(arrays[owner])
+        if len(values) not in (0, wanted):
+            raise InvalidParameterError(f"{name}: has {len(values)} rows for {wanted} {owner}")
+        if len(values) < wanted:
+            unknown = np.full((wanted, *values.shape[1:]), np.nan if values.dtype == float else -1)
             arrays[name] = arrays["radii"] if name.startswith("half") else unknown
     for name, array in arrays.items():
         object.__setattr__(skeleton, name, array)
@@ -233,11 +233,11 @@ def _check_values(skeleton: Skeleton) -> None:
     """Raise InvalidParameterError for the first number that cannot be true."""
     m, owner = len(skeleton.vertices), skeleton.vertex_of_point
     finite = f"must be finite, and at most {FARTHEST_PLACE:g}"
-    there = f"names a missing vertex: there are {m}"
+    vertex_range = f"names a missing vertex: there are {m}"
     _check_range(skeleton, "vertices", -FARTHEST_PLACE, FARTHEST_PLACE, finite)
-    _check_range(skeleton, "edges", 0, m - 1, there)
+    _check_range(skeleton, "edges", 0, m - 1, vertex_range)
     _refuse(skeleton, "edges", skeleton.edges[:, 0] == skeleton.edges[:, 1], "joins a vertex with itself")
-    _check_range(skeleton, "vertex_of_point", -1, m - 1, there)
+    _check_range(skeleton, "vertex_of_point", -1, m - 1, vertex_range)
     representative = skeleton.representative_of_point
     _check_range(skeleton, "representative_of_point", -1, len(owner) - 1, "names a missing point")
     further = (representative >= 0) & (representative[representative] >= 0)

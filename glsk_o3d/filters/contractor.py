@@ -161,8 +161,8 @@ class Contractor(Filter[Contraction, Contraction]):
             contraction_weight=contraction,
         )
         # In the first pass the published code takes a(1) itself for the drop, not 1 - a(1); so does this one.
-        done = state.report.iterations
-        drop = done[-1].ring_ratio - contracted.ring_ratio if done else contracted.ring_ratio  # Wen (10)
+        iterations = state.report.iterations
+        drop = iterations[-1].ring_ratio - contracted.ring_ratio if iterations else contracted.ring_ratio  # Wen (10)
         return replace(contracted, ring_ratio_drop=drop), facts
 
     def _solve_in_box(
@@ -210,11 +210,15 @@ def explained_score(points: np.ndarray) -> float:
 
 def _record(state: Contraction, **facts: Any) -> Contraction:
     """A state with the record of its last solve in the report."""
-    done, explained = state.report.iterations, explained_score(state.positions)
-    before, n_before = (done[-1].explained, done[-1].n_points) if done else (explained_score(state.cloud), len(state))
+    iterations, explained = state.report.iterations, explained_score(state.positions)
+    before, n_before = (
+        (iterations[-1].explained, iterations[-1].n_points)
+        if iterations
+        else (explained_score(state.cloud), len(state))
+    )
     kept = 1 - (n_before - len(state)) / state.report.n_contracted  # Wen (15)
     record = IterationRecord(
-        iteration=len(done) + 1,
+        iteration=len(iterations) + 1,
         n_points=len(state),
         n_merged=0,
         explained=explained,
@@ -223,16 +227,16 @@ def _record(state: Contraction, **facts: Any) -> Contraction:
         contraction_weight=state.contraction_weight,
         **facts,
     )
-    return state.with_facts(iterations=(*done, record))
+    return state.with_facts(iterations=(*iterations, record))
 
 
 def _reduced(state: Contraction, reducer: Reducer, start: float) -> Contraction:
     """A state after a pass of the reducer, which is no stage of its own in the report."""
     reduced = reducer(state)
-    *done, last = reduced.report.iterations
+    *earlier, last = reduced.report.iterations
     last = replace(last, n_merged=len(state) - len(reduced), seconds=time.perf_counter() - start)
     report = RunContext(state.report).report_of(reduced.report)
-    return reduced.with_report(report).with_facts(iterations=(*done, last))
+    return reduced.with_report(report).with_facts(iterations=(*earlier, last))
 
 
 def _finished(state: Contraction, reason: str, converged: bool = False) -> Contraction:

@@ -81,8 +81,8 @@ class OutlierRemover(Filter[Points, Points]):
             return points
         gone = np.ones(len(points), bool)
         gone[remaining] = False
-        rest = points.without(gone, neighbours)
-        return rest.with_facts(n_mixed=int(mixed.sum()))
+        remaining_points = points.without(gone, neighbours)
+        return remaining_points.with_facts(n_mixed=int(mixed.sum()))
 
 
 def inliers(
@@ -114,8 +114,8 @@ def inliers(
         remaining, index = remaining[keep], np.cumsum(~outlier) - 1
         k = min(neighbours.shape[1], len(remaining))
         changed = np.flatnonzero(outlier[neighbours[keep]].any(axis=1))
-        distance, neighbours, there = distance[keep], index[neighbours[keep, :k]], points[remaining]
-        near, neighbours[changed] = nearest_neighbours(there, k, of=there[changed])
+        distance, neighbours, near_points = distance[keep], index[neighbours[keep, :k]], points[remaining]
+        near, neighbours[changed] = nearest_neighbours(near_points, k, of=near_points[changed])
         distance[changed] = near[:, 1:].mean(axis=1)
     return remaining, neighbours
 
@@ -137,9 +137,9 @@ def mixed_pixels(points: Points, distance: np.ndarray, factor: float) -> tuple[n
     densest = np.where(flat, mean, np.inf)
     if np.count_nonzero(thick > factor * densest.min()) <= few:  # as in most clouds
         return none, False
-    each = np.ascontiguousarray(neighbours.T)
+    columns = np.ascontiguousarray(neighbours.T)
     for _ in range(OUTLIER.hops + 1):
-        densest = densest.take(each).min(axis=0)
+        densest = densest.take(columns).min(axis=0)
     if np.count_nonzero(thick > factor * densest) <= few:
         return none, False
     mixed = thick > np.sqrt(factor) * densest
@@ -154,9 +154,9 @@ def in_floating_cluster(points: np.ndarray, weight: np.ndarray, mean: np.ndarray
     They are far from their neighbours, a distance `mean` (n,), for what is some steps away, or anywhere if they are an
     island; and together they fill space, or are a handful alone. A sparse surface is flat, and a sparse limb long.
     """
-    densest, each = row_medians(mean.take(neighbours)), np.ascontiguousarray(neighbours.T)
+    densest, columns = row_medians(mean.take(neighbours)), np.ascontiguousarray(neighbours.T)
     for _ in range(OUTLIER.hops):
-        densest = densest.take(each).min(axis=0)
+        densest = densest.take(columns).min(axis=0)
     island, sparse = np.zeros(len(points), bool), mean > OUTLIER.floating_ratio * np.median(mean)
     if sparse.any():
         near = neighbours[:, 1:5]

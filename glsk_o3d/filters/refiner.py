@@ -157,7 +157,7 @@ class Refiner(Filter[Skeleton, Skeleton]):
                 n_handles = curve.n_loops
                 if deferred is None:  # loops may have hidden that a part has no surface
                     curve, surface, deferred = self._without_deferred(curve, surface)
-        counts = {about: len(_changes(found)) for about, found in decisions.items()}
+        counts = {about: len(_changes(given)) for about, given in decisions.items()}
         curve = curve.with_facts(
             decisions=tuple(decision for about in decisions.values() for decision in about),
             n_loops_closed=counts["loop"],

@@ -88,10 +88,10 @@ class Thinner(Filter[Points, Points]):
 
 def _merged(points: Points, representative: np.ndarray) -> Points:
     """What is left when survivors are merged into others."""
-    kept, here = representative == np.arange(len(representative)), points.cloud[points.survivors]
-    neighbours = nearest_left(here, points.neighbours, kept, default_k(int(kept.sum())))
-    neighbours = reach_next_rows(here[kept], neighbours)
-    spread, normals = principal(here[kept], neighbours)
+    kept, surface = representative == np.arange(len(representative)), points.cloud[points.survivors]
+    neighbours = nearest_left(surface, points.neighbours, kept, default_k(int(kept.sum())))
+    neighbours = reach_next_rows(surface[kept], neighbours)
+    spread, normals = principal(surface[kept], neighbours)
     return points.merged_into(representative, neighbours=neighbours, spread=spread, ring_normals=normals)
 
 
@@ -121,7 +121,7 @@ def thin(points: np.ndarray, neighbours: np.ndarray, n: int) -> np.ndarray:
     return representative
 
 
-def thin_nearer(points: np.ndarray, neighbours: np.ndarray, apart: np.ndarray) -> np.ndarray:
+def thin_nearer(points: np.ndarray, neighbours: np.ndarray, spread: np.ndarray) -> np.ndarray:
     """Merge mutual nearest neighbours that are nearer than they are to be, round by round, as long as it is worth it.
 
     Of two points the lesser distance `apart` (n,) counts, and the one stays that more were merged into, so that none
@@ -130,7 +130,7 @@ def thin_nearer(points: np.ndarray, neighbours: np.ndarray, apart: np.ndarray) -
 
     def choose(pairs: Pairs, mass: np.ndarray) -> Pairs:
         kept, swallowed = pairs
-        reach = np.minimum(apart[kept], apart[swallowed])
+        reach = np.minimum(spread[kept], spread[swallowed])
         nearer = norm(points.take(kept, axis=0) - points.take(swallowed, axis=0)) < reach
         nearer &= np.count_nonzero(nearer) > THIN_OUT.least_merged * len(points)
         kept, swallowed = kept[nearer], swallowed[nearer]

@@ -1,6 +1,7 @@
 """Tracer: thin parts without a surface -> shortest paths, and one rooted tree."""
 
 from dataclasses import dataclass
+
 from ..curve.curve import Curve
 from ..curve.diagnostics import measured
 from ..curve.sampling import along_a_morton_curve, on_points
@@ -58,4 +59,4 @@ class Tracer(Filter[Skeleton, Skeleton]):
         if self.root is None and not (self.surface and may_lack_surface(curve, self.surface)):
             return skeleton  # as most are: sorting many points would take longer than all else
         rows = along_a_morton_curve(curve, distinct=True)
-        return on_points(lambda some: measured(trace(some, self.surface, self.root)), curve, rows).to_skeleton()
+        return on_points(lambda part: measured(trace(part, self.surface, self.root)), curve, rows).to_skeleton()

@@ -29,7 +29,7 @@ def cotangent_laplacian(points: np.ndarray, rings: Rings, cap: float = WEIGHT_CA
     x = np.ascontiguousarray(points.T)
     entry, after = rings.fans
     centre = x.take(rings.centres[entry], axis=1)
-    one, other = (x.take(rings.indices[at], axis=1) - centre for at in (entry, after))
+    one, other = (x.take(rings.indices[rows], axis=1) - centre for rows in (entry, after))
     opposite = other - one
     (a, b, c), (u, v, w) = one, other
     area = np.sqrt((b * w - c * v) ** 2 + (c * u - a * w) ** 2 + (a * v - b * u) ** 2)

@@ -132,9 +132,9 @@ def _candidates(
 
 def _walk(chains: list[list[int]]) -> list[int]:
     """Join chains that form one cycle, end to end."""
-    walk, *rest = chains
-    while rest:
-        chain = rest.pop(next(i for i, chain in enumerate(rest) if walk[-1] in (chain[0], chain[-1])))
+    walk, *others = chains
+    while others:
+        chain = others.pop(next(i for i, chain in enumerate(others) if walk[-1] in (chain[0], chain[-1])))
         walk = walk + (chain[1:] if chain[0] == walk[-1] else chain[-2::-1])
     return walk[:-1]
 

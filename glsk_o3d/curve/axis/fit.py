@@ -154,16 +154,16 @@ def _smoother(surface: Surface, points: np.ndarray, p: np.ndarray) -> Callable[[
     """
     diffusion, node = surface.diffusion, np.searchsorted(points, surface.supporting)
     node = np.minimum(node, len(points) - 1)
-    there = points[node] == surface.supporting  # points of vertices without edges have no place
+    has_place = points[node] == surface.supporting  # points of vertices without edges have no place
     nearest = np.arange(len(points))
-    if there.sum() < len(points):
-        nearest = node[there][nearest_neighbours(p[node[there]], 1, of=p)[1][:, 0]]
+    if has_place.sum() < len(points):
+        nearest = node[has_place][nearest_neighbours(p[node[has_place]], 1, of=p)[1][:, 0]]
     start = surface.points + (p[node[:1]] - surface.points[:1])
 
     def smooth(place: Floats, length: np.ndarray) -> np.ndarray:
-        values = np.where(there[:, None], place[node], start)
+        values = np.where(has_place[:, None], place[node], start)
         moved = np.zeros_like(place)
-        moved[node[there]] = (diffusion(values, np.where(there, length[node], 0)) - values)[there]
+        moved[node[has_place]] = (diffusion(values, np.where(has_place, length[node], 0)) - values)[has_place]
         return place + moved[nearest]
 
     return smooth
@@ -207,18 +207,18 @@ def _nearest(
     if sides:
         inward = dot(n, offset)[:, None]
         facts += [-np.sign(inward) * n, -inward * n, inward**2 * facts[3][:, :6]]
-    at = group_sum(np.column_stack(facts), edge, len(ends))
-    at = group_sum(np.concatenate([at, at]), np.concatenate([a, b]), len(x))
-    at = at + group_sum(at[np.concatenate([b, a])], np.concatenate([a, b]), len(x))
-    miss_at, apart_at, support = at[:, :3].T
-    sections = half_axes(at[:, 3:15], radii)
+    sums = group_sum(np.column_stack(facts), edge, len(ends))
+    sums = group_sum(np.concatenate([sums, sums]), np.concatenate([a, b]), len(x))
+    sums = sums + group_sum(sums[np.concatenate([b, a])], np.concatenate([a, b]), len(x))
+    miss_at, apart_at, support = sums[:, :3].T
+    sections = half_axes(sums[:, 3:15], radii)
     apart_at = np.maximum(apart_at, 0)  # but for rounding, a difference of squares
     # normals that point anywhere explain half of the distance; without points there is nothing but doubt
     doubt = np.where(apart_at > 0, np.minimum(2 * miss_at, apart_at) / np.maximum(apart_at, TINY), 1)
     # normals of a sheet as thin as its points are apart say nothing of its width, and there is nothing but doubt
-    spread = _spread_width(at[:, 15:21] / np.maximum(2 * support, TINY)[:, None])
+    spread = _spread_width(sums[:, 15:21] / np.maximum(2 * support, TINY)[:, None])
     width = sections.half_width + doubt * np.maximum(FIT.spread * spread - sections.half_width, 0)
-    return _Nearest(edge, share, tangent, across, offset, doubt, support, sections, width, at[:, 3:9], at[:, 21:])
+    return _Nearest(edge, share, tangent, across, offset, doubt, support, sections, width, sums[:, 3:9], sums[:, 21:])
 
 
 def _pull(near: _Nearest) -> np.ndarray:
@@ -259,8 +259,8 @@ def _sides_and_faces(near: _Nearest) -> np.ndarray:
     both = np.stack([near.faces, near.outward[:, 6:]])[:, :, FULL]
     of_sides = np.einsum("mi,kmij,mj->km", across, both, across)
     # rounding leaves less than nothing
-    found: np.ndarray = np.maximum(np.stack([of_sides, np.trace(both, axis1=2, axis2=3) - of_sides]), 0)
-    return found
+    squared_sines: np.ndarray = np.maximum(np.stack([of_sides, np.trace(both, axis1=2, axis2=3) - of_sides]), 0)
+    return squared_sines
 
 
 def _flat_doubt(near: _Nearest, spacing: float) -> np.ndarray:
@@ -306,9 +306,9 @@ def _solve(x: np.ndarray, near: _Nearest, p: np.ndarray, pattern: _Pattern, sett
     pull = upright @ pull @ upright
     # Of every point b b^T by its six different entries, and that it is there, once for each pair of ends of its edge;
     # and what they say of its place, and where and that it is there, once for each end.
-    here = np.ones(len(p))
-    matrix = np.column_stack([near.across[:, ROWS] * near.across[:, COLUMNS], here])
-    target = np.column_stack([dot(near.across, p)[:, None] * near.across, p, here])
+    weight_of_point = np.ones(len(p))
+    matrix = np.column_stack([near.across[:, ROWS] * near.across[:, COLUMNS], weight_of_point])
+    target = np.column_stack([dot(near.across, p)[:, None] * near.across, p, weight_of_point])
     share, pairs = near.share, near.share[:, [0, 0, 1]] * near.share[:, [0, 1, 1]]
     at_pairs = group_sum(matrix, near.edge[:, None] + e * np.arange(3), 3 * e, pairs)
     at_ends = group_sum(target, near.edge[:, None] + e * np.arange(2), 2 * e, share)

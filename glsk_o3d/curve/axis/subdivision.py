@@ -42,15 +42,15 @@ def subdivide_edges(curve: Curve, spacing: float) -> Curve:
         vertex, points = vertex_of_point[part], curve.points[part]
         choice, best = vertex.copy(), norm(points - curve.vertices.take(vertex, axis=0))
         for column in around[vertex].T:
-            some = np.flatnonzero(column >= 0)
-            some = some[inner[column[some]] > 0]
-            e = column[some]
-            p, a = points.take(some, axis=0), curve.vertices.take(ends[e, 0], axis=0)
+            rows = np.flatnonzero(column >= 0)
+            rows = rows[inner[column[rows]] > 0]
+            e = column[rows]
+            p, a = points.take(rows, axis=0), curve.vertices.take(ends[e, 0], axis=0)
             along = curve.vertices.take(ends[e, 1], axis=0) - a
             place = pieces[e] * dot(p - a, along) / np.maximum(dot(along, along), TINY)
             sample = first[e] + np.clip(np.rint(place), 1, inner[e]).astype(int) - 1
             distance = norm(p - vertices.take(sample, axis=0))
-            nearer = distance < best[some]
-            choice[some[nearer]], best[some[nearer]] = sample[nearer], distance[nearer]
+            nearer = distance < best[rows]
+            choice[rows[nearer]], best[rows[nearer]] = sample[nearer], distance[nearer]
         vertex_of_point[part] = choice
     return curve.rewired(edges, vertices=vertices, radii=radii, vertex_of_point=vertex_of_point)

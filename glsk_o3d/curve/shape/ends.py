@@ -151,9 +151,9 @@ def _last(cloud: VertexPoints, path: np.ndarray, along: np.ndarray, first: int, 
     count = cloud.count[path] * (other | (np.arange(len(path)) > 0))
     own = cloud.members.of(path[count > 0])
     thick = np.sqrt((cloud.offset[own] ** 2).sum() / max(len(own), 1))
-    some = np.cumsum(count[::-1])[::-1] > (1 - END.reach) * len(own)
+    seen = np.cumsum(count[::-1])[::-1] > (1 - END.reach) * len(own)
     least = np.searchsorted(along, along[-1] - END.cut * thick)
-    return int(min(max(np.flatnonzero(some).max(initial=0), least, first), len(path) - 1))
+    return int(min(max(np.flatnonzero(seen).max(initial=0), least, first), len(path) - 1))
 
 
 def _within(along: np.ndarray, stop: float, length: float) -> np.ndarray:
@@ -194,7 +194,7 @@ class _End(NamedTuple):
 
     points: np.ndarray  # (n, 3)
     normals: np.ndarray  # (n, 3), of either sign
-    way: Floats  # (3,), slope of the parabola at the origin
+    direction: Floats  # (3,), slope of the parabola at the origin
     bend: Floats  # (3,), and how fast it changes along it
     length: np.ndarray  # (n,), along the curve to the place nearest to each point
     steps: np.ndarray  # (s,), of the parabola,
@@ -219,11 +219,11 @@ class _End(NamedTuple):
     def curve(self, length: np.ndarray) -> np.ndarray:
         """Places so far ahead, (k, 3) float array."""
         step: Floats = np.interp(length, self.along, self.steps) + np.maximum(length - self.along[-1], 0)
-        return step[:, None] * self.way + (step**2 / 2)[:, None] * self.bend
+        return step[:, None] * self.direction + (step**2 / 2)[:, None] * self.bend
 
     def slope(self, length: np.ndarray) -> np.ndarray:
         """Directions of the curve so far ahead, (k, 3) float array."""
-        return self.way + np.interp(length, self.along, self.steps)[:, None] * self.bend
+        return self.direction + np.interp(length, self.along, self.steps)[:, None] * self.bend
 
     def tip(self, taper: _Taper, to_surface: bool) -> float:
         """How far the limb goes on, or its axis within it.

@@ -111,7 +111,7 @@ def _places(
         for k, line in enumerate(lines):
             if len(line.lead) > 1:  # a handle goes straight on through its body to the place nearest to the middle
                 wall = line.lead[:1]
-                way_in = wall + max((place - wall[0]) @ line.way, 0) * line.way
+                way_in = wall + max((place - wall[0]) @ line.direction, 0) * line.direction
                 lines[k] = line._replace(lead=np.concatenate([way_in, line.lead]))
         known[name] = places[junction] = _Place(place, touching, lines)
     return places
@@ -152,22 +152,22 @@ def _straightened(curve: Curve, limbs: JunctionLimbs, places: dict[int, _Place])
             along = arc_lengths(curve.vertices[path])
             start, lead = line.start, line.lead
             # the place lies ahead of where the limb is joined: it would turn back
-            if len(lead) == 1 and (lead[0] - place) @ line.way > 0:
-                ahead = np.flatnonzero((along > start) & ((curve.vertices[path] - place) @ line.way < 0))
+            if len(lead) == 1 and (lead[0] - place) @ line.direction > 0:
+                ahead = np.flatnonzero((along > start) & ((curve.vertices[path] - place) @ line.direction < 0))
                 if len(ahead):
                     start, lead = along[ahead[0]], curve.vertices[path[ahead[:1]]]
             moved = np.flatnonzero((along > 0) & (along < start))
             lead = np.concatenate([[place], lead])
             lengths = arc_lengths(lead)
-            there = along[moved] / max(start, TINY) * lengths[-1]
+            new_length = along[moved] / max(start, TINY) * lengths[-1]
             if len(lead) > 2 and len(moved):  # the wall is a corner
-                there[np.abs(there - lengths[2]).argmin()] = lengths[2]
-            vertices[path[moved]] = place_at(lead, lengths, there)
+                new_length[np.abs(new_length - lengths[2]).argmin()] = lengths[2]
+            vertices[path[moved]] = place_at(lead, lengths, new_length)
             # a junction owns points of everything around: what it measured itself does not count
             radius = np.interp(start, along, curve.radii[path])
             radii[path[moved]] = radius
             if len(lead) > 2:  # but what a body measured does
-                inside, radius = path[moved[there < lengths[1]]], curve.radii[junction]
+                inside, radius = path[moved[new_length < lengths[1]]], curve.radii[junction]
                 confidence[path[moved]] = np.interp(start, along, curve.confidence[path])
                 radii[inside], confidence[inside] = radius, curve.confidence[junction]
                 entering.append(path[moved])
@@ -188,8 +188,10 @@ def _through_air(curve: Curve, places: dict[int, _Place]) -> np.ndarray:
     """
     if not places:
         return np.empty((0, 2, 3))
-    ends = np.array([(it.place, line.lead[:2][-1]) for it in places.values() for line in it.lines]).reshape(-1, 2, 3)
-    thickest = [max(line.radius for line in it.lines) for it in places.values() for _ in it.lines]
+    ends = np.array(
+        [(junction.place, line.lead[:2][-1]) for junction in places.values() for line in junction.lines]
+    ).reshape(-1, 2, 3)
+    thickest = [max(line.radius for line in junction.lines) for junction in places.values() for _ in junction.lines]
     away = cKDTree(curve.points[curve.vertex_of_point >= 0]).query(ends.mean(axis=1))[0]
     return ends[np.isfinite(away) & (away > CURVE.line_length * np.array(thickest))]
 
@@ -209,8 +211,8 @@ def limb_line(
     step = max(JUNCTION.line_step * radius, along[-1] / JUNCTION.most_steps, TINY)
     n = max(int(np.ceil(along[-1] / step)), JUNCTION.least_steps)
     step, half = along[-1] / n, n // 2
-    at = (np.arange(n) + 0.5) * step
-    middles, clear = place_at(places, along, at), np.ones(n)
+    positions = (np.arange(n) + 0.5) * step
+    middles, clear = place_at(places, along, positions), np.ones(n)
     if others:
         ratio, _ = relative_distance(middles, vertices, surface, others)
         clear = np.clip((ratio - 1) / (2 * (CURVE.undisturbed - 1)), 0, 1)
@@ -222,11 +224,11 @@ def limb_line(
     if total * step <= 0:
         return Line(anchor, np.zeros(3), 0.0, 0.0, start, anchor[None], radius)
     weight /= total
-    middle, mean = weight @ middles, weight @ at
-    direction = (weight * (mean - at)) @ (middles - middle)
+    middle, mean = weight @ middles, weight @ positions
+    direction = (weight * (mean - positions)) @ (middles - middle)
     direction /= max(np.linalg.norm(direction), TINY)
-    off = middles - middle - (mean - at)[:, None] * direction
-    spread, bend = np.sqrt(weight @ (at - mean) ** 2), np.sqrt(weight @ dot(off, off))
+    off = middles - middle - (mean - positions)[:, None] * direction
+    spread, bend = np.sqrt(weight @ (positions - mean) ** 2), np.sqrt(weight @ dot(off, off))
     return Line(middle, direction, float(spread), float(bend), start, anchor[None], radius)
 
 
@@ -248,7 +250,7 @@ def meet(
     """
     place, touching, radius = near, radius, max(radius, TINY ** (1 / 3))  # its square is a divisor
     known = [line for line in lines if line.spread > 0 and line.radius > 0]
-    middle, direction = np.array([(line.middle, line.way) for line in known]).reshape(-1, 2, 3).transpose(1, 0, 2)
+    middle, direction = np.array([(line.middle, line.direction) for line in known]).reshape(-1, 2, 3).transpose(1, 0, 2)
     spread, noise = (
         np.array([(line.spread, line.bend / line.radius + JUNCTION.line_noise) for line in known]).reshape(-1, 2).T
     )

@@ -76,9 +76,9 @@ def _levelled(curve: Curve, run: np.ndarray, surface: Surface) -> Curve:
     band = np.minimum((n * away / max(away.max(), TINY)).astype(int), n - 1)
     count = np.bincount(band, minlength=n)
     mean = group_sum(points, band, n) / np.maximum(count, 1)[:, None]
-    some = np.flatnonzero(count)
+    occupied = np.flatnonzero(count)
     vertices, owner = curve.vertices.copy(), curve.vertex_of_point.copy()
-    vertices[run[2:]] = np.column_stack([np.interp(np.arange(n), some, column) for column in mean[some].T])
+    vertices[run[2:]] = np.column_stack([np.interp(np.arange(n), occupied, column) for column in mean[occupied].T])
     owned = np.flatnonzero(np.isin(owner, run[2:]))
     owner[owned] = run[2 + band[nearest_neighbours(points, 1, of=curve.points[owned])[1][:, 0]]]
     return curve.changed(vertices=vertices, vertex_of_point=owner)

@@ -53,22 +53,22 @@ class Deferred(NamedTuple):
             normals=whole.normals[rows],
         )
 
-    def put_back(self, rest: Curve) -> Curve:
+    def put_back(self, curve: Curve) -> Curve:
         """The refined rest, and behind its vertices those set aside, as trees tied to where it is nearest."""
-        whole, gone, m = self.whole, self.gone, len(rest.vertices)
+        whole, gone, m = self.whole, self.gone, len(curve.vertices)
         number = m - 1 + np.cumsum(gone)
         ends = whole.edges[gone[whole.edges].any(axis=1)]
         ties, stays = number[ends], ~gone[ends]
         if stays.any():
-            ties[stays] = cKDTree(rest.vertices).query(whole.vertices[ends[stays]])[1]
-        piece = np.append(rest.component_of_vertex, rest.n_components + np.arange(gone.sum()))
+            ties[stays] = cKDTree(curve.vertices).query(whole.vertices[ends[stays]])[1]
+        piece = np.append(curve.component_of_vertex, curve.n_components + np.arange(gone.sum()))
         if len(ties):
             ties = ties[spanning(piece, ties, norm(whole.vertices[ends[:, 1]] - whole.vertices[ends[:, 0]]))]
         owner = np.where(whole.vertex_of_point >= 0, number[whole.vertex_of_point], -1)
-        owner[self.rows] = rest.vertex_of_point
-        inside, outside = all_of_vertices(rest), all_of_vertices(whole, gone)
-        return rest.rewired(
-            np.concatenate([rest.edges, ties]),
+        owner[self.rows] = curve.vertex_of_point
+        inside, outside = all_of_vertices(curve), all_of_vertices(whole, gone)
+        return curve.rewired(
+            np.concatenate([curve.edges, ties]),
             **{name: np.concatenate([inside[name], outside[name]]) for name in inside},
             vertex_of_point=owner,
             points=whole.points,
@@ -76,5 +76,5 @@ class Deferred(NamedTuple):
         )
 
 
-def _most(cloud: SpacedPoints, some: np.ndarray) -> bool:
-    return bool(cloud.count[some].sum() > CURVE.majority * cloud.count.sum())
+def _most(cloud: SpacedPoints, rows: np.ndarray) -> bool:
+    return bool(cloud.count[rows].sum() > CURVE.majority * cloud.count.sum())

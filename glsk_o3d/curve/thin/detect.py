@@ -49,11 +49,11 @@ class SpacedPoints(VertexPoints):
     @cached_property
     def rows(self) -> np.ndarray:
         """Which input points they are."""
-        points, some = self.graph.points, np.flatnonzero(self.graph.vertex_of_point >= 0)
-        if len(some):
-            some = some[sample_cloud(points[some], SAMPLED_POINTS)[0]]
-        wide = np.ptp(points[some], axis=0).max() if len(some) else 0.0
-        return some[first_in_their_place(np.rint(points[some] / max(THIN.same_place * wide, TINY)))]
+        points, owned = self.graph.points, np.flatnonzero(self.graph.vertex_of_point >= 0)
+        if len(owned):
+            owned = owned[sample_cloud(points[owned], SAMPLED_POINTS)[0]]
+        wide = np.ptp(points[owned], axis=0).max() if len(owned) else 0.0
+        return owned[first_in_their_place(np.rint(points[owned] / max(THIN.same_place * wide, TINY)))]
 
     @cached_property
     def links(self) -> csr_matrix:
@@ -147,11 +147,11 @@ def one_direction(normals: np.ndarray, links: csr_matrix) -> np.ndarray:
     return largest_eigenvalue(along.T) / np.maximum(along[:, ROWS == COLUMNS].sum(axis=1), TINY)
 
 
-def _share_around(near: np.ndarray, count: np.ndarray, some: np.ndarray) -> np.ndarray:
+def _share_around(near: np.ndarray, count: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Share that some vertices have in the points of the region around every vertex, by its nearest ones."""
     points = count[near]
     points[np.cumsum(points, axis=1) - points >= THIN.region_points] = 0
-    return (points * some[near]).sum(axis=1) / np.maximum(points.sum(axis=1), 1)
+    return (points * rows[near]).sum(axis=1) / np.maximum(points.sum(axis=1), 1)
 
 
 def _surely_with_surface(curve: Graph) -> np.ndarray:

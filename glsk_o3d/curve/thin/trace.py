@@ -93,24 +93,24 @@ class _Mixed:
 
     @classmethod
     def of(cls, curve: Curve, cloud: SpacedPoints, thin: np.ndarray) -> _Mixed:
-        some, scale = np.empty(0, int), 0.0
+        thin_rows, scale = np.empty(0, int), 0.0
         if thin.any():
             scale = float(np.median(cloud.away[:, -1]))
             piece = connected_components(cloud.links, directed=False)[1]
             floats = cloud.away[:, min(TRACE.piece - 1, cloud.away.shape[1] - 1)] > TRACE.join * scale
             floats &= (np.bincount(piece) < TRACE.piece)[piece]
-            some = np.flatnonzero(thin[cloud.vertex] & ~floats)
-        thick, n = np.flatnonzero(~thin), len(some)
+            thin_rows = np.flatnonzero(thin[cloud.vertex] & ~floats)
+        thick, n = np.flatnonzero(~thin), len(thin_rows)
         index = np.full(len(thin), -1)
         index[thick] = n + np.arange(len(thick))
         edges = index[curve.edges]
         ends = edges = edges[(edges >= 0).all(axis=1)]
         if n:
             node = index[cloud.vertex]
-            node[some] = np.arange(n)
+            node[thin_rows] = np.arange(n)
             near = node[np.column_stack(cloud.links.nonzero())]
             ends = np.concatenate([edges, near[(near >= 0).all(axis=1) & (near < n).any(axis=1)]])
-        places = np.concatenate([cloud.points[some], curve.vertices[thick]])
+        places = np.concatenate([cloud.points[thin_rows], curve.vertices[thick]])
         radius = np.concatenate([np.zeros(n), curve.radii[thick]])
         return cls(n, places, linked(places, ends), edges, thick, radius, scale)
 
@@ -246,8 +246,8 @@ def thickness_around(curve: Curve) -> np.ndarray:
 def _distances(curve: Curve) -> tuple[np.ndarray, np.ndarray]:
     """How far points are from the curve, and each time the vertex, for that of a point and those beside it."""
     m, edges = len(curve.vertices), curve.edges
-    some = np.flatnonzero(curve.vertex_of_point >= 0)
-    vertex, points = curve.vertex_of_point[some], curve.points[some]
+    owned = np.flatnonzero(curve.vertex_of_point >= 0)
+    vertex, points = curve.vertex_of_point[owned], curve.points[owned]
     edge, t = nearest_on_edges(curve.vertices, edges, incident_edges(edges, m)[vertex], points)
     away = norm(points - places_on_edges(curve.vertices, edges, edge, t))
     around = steps(linked(curve.vertices, edges))[vertex]
@@ -271,9 +271,9 @@ def drop_spurious(curve: Curve, traced: np.ndarray, radii: float, root: int | No
         forks, tips = np.array([path[[0, -1]] for path in twigs]).T
         body = np.concatenate([path[1:] for path in twigs])
         twig = np.repeat(np.arange(len(tips)), [len(path) - 1 for path in twigs])
-        rest = np.delete(np.arange(len(traced)), body)
-        away, nearest = cKDTree(curve.vertices[rest]).query(curve.vertices[tips])
-        beside = rest[nearest]
+        others = np.delete(np.arange(len(traced)), body)
+        away, nearest = cKDTree(curve.vertices[others]).query(curve.vertices[tips])
+        beside = others[nearest]
         beyond = away - np.where(traced[beside], scatter, radii) * curve.radii[beside]
         order = np.argsort(beyond)
         # of each fork the least, since the others may be what is left of the limb

@@ -56,7 +56,7 @@ class Gaps(Question):
         """One for each end, see `gap_facts`, the likeliest first."""
         asked = [(logistic(self.weights, facts), pair, facts) for pair, facts in gap_facts(evidence)]
         answers, used = list[Candidate](), set[int]()
-        for probability, pair, facts in sorted(asked, key=lambda each: -each[0]):
+        for probability, pair, facts in sorted(asked, key=lambda candidate: -candidate[0]):
             if used.isdisjoint(pair):
                 used.update(pair)
                 place = evidence.curve.vertices[list(pair)].mean(axis=0)
@@ -90,7 +90,7 @@ def gap_facts(evidence: Evidence) -> Iterator[tuple[tuple[int, int], dict[str, f
     if not bridges:
         return
     across = [curve.vertices[other] - end.place for end, other in bridges]
-    samples = [end.place + BRIDGE_SAMPLES * way for (end, *_), way in zip(bridges, across, strict=True)]
+    samples = [end.place + BRIDGE_SAMPLES * gap for (end, *_), gap in zip(bridges, across, strict=True)]
     winding = surface.winding(np.concatenate(samples)).reshape(len(bridges), -1).min(axis=1) / typical
     for (end, other), least in zip(bridges, winding, strict=True):
         facts = dict(

@@ -235,8 +235,8 @@ def _falls(views: list[_View], inside: np.ndarray, surface: Surface) -> list[np.
     first = order[group_rank(loop, len(views)) < LOOP.widest_first]
     for _ in range(2):
         unasked[first] = False
-        there = surface.winding(places[first])
-        fall[first] = np.clip(1 - there / np.maximum(inside[loop[first]], CURVE.inside), 0, 1)
+        winding = surface.winding(places[first])
+        fall[first] = np.clip(1 - winding / np.maximum(inside[loop[first]], CURVE.inside), 0, 1)
         best = np.zeros(len(views))
         np.maximum.at(best, loop, sight * fall)
         first = np.flatnonzero(unasked & (sight >= best[loop]))
@@ -250,8 +250,8 @@ def crossings(place: np.ndarray, n: int, bonds: tuple[np.ndarray, np.ndarray], c
     closed, edges lead from each position to the next, and bonds the shorter way; else the last one is none.
     """
     pairs, weight = bonds
-    some = np.flatnonzero(place >= 0)
-    start, stop = np.searchsorted(pairs[:, 0], [some, some + 1])  # bonds are in the order of their first vertices
+    on_path = np.flatnonzero(place >= 0)
+    start, stop = np.searchsorted(pairs[:, 0], [on_path, on_path + 1])  # bonds are in the order of their first vertices
     rows = np.arange((stop - start).sum()) + np.repeat(stop - np.cumsum(stop - start), stop - start)
     (first, last), weight = np.sort(place[pairs[rows]], axis=1).T, weight[rows]
     inside = first >= 0
@@ -284,7 +284,7 @@ def facing_pairs(points: np.ndarray, labels: np.ndarray) -> np.ndarray:
         np.arange(first, first - (first - last) % n - 1, -1) % n,
     ]
     travelled = [arc_lengths(points[side]) for side in sides]
-    along = [each / each[-1] for each in travelled]
+    along = [lengths / lengths[-1] for lengths in travelled]
     nearest = np.abs(along[0][:, None] - along[1][None])
     pairs = [(i, int(np.argmin(nearest[i]))) for i in range(1, len(sides[0]) - 1)]
     pairs += [(int(np.argmin(nearest[:, j])), j) for j in range(1, len(sides[1]) - 1)]

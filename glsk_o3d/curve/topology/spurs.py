@@ -77,7 +77,7 @@ class Limbs(Question):
         asked = [(k, path) for k, path in paths if degree[path[0]] > 2 and degree[path[-1]] == 1]
         keys = [limbs.signature(int(path[0])) + curve.vertices[path].tobytes() for _, path in asked]
         facts = self._known.of(keys, asked, partial(_facts, curve, evidence.surface, limbs))
-        probabilities = [logistic(self.weights, each) for each in facts]
+        probabilities = [logistic(self.weights, values) for values in facts]
         worst: dict[int, int] = {}
         for i, (_, path) in enumerate(asked):
             junction = int(path[0])
@@ -190,5 +190,5 @@ def _standing_out(limbs: JunctionLimbs, k: int, junction: int, points: np.ndarra
     vertices = np.concatenate([limbs.vertices, anchor[longer], foot[longer]])
     more = len(limbs.vertices) + np.arange(2 * len(longer)).reshape(2, -1).T
     paths = [*(limbs.paths[i] for i in around), *more]
-    ratio, there = relative_distance(points, vertices, np.r_[surface, radius, radius], paths)
-    return quantile((ratio - 1) * there, LIMB.quantile)
+    ratio, thickness = relative_distance(points, vertices, np.r_[surface, radius, radius], paths)
+    return quantile((ratio - 1) * thickness, LIMB.quantile)
