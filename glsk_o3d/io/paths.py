@@ -4,8 +4,8 @@ Readers compare what a header promises with the size of the file before they tak
 they return it. What unpacks or repeats itself has a budget, a multiple of the size.
 """
 
+from array import array
 from collections.abc import Iterable, Iterator
-from itertools import chain, islice
 from typing import BinaryIO
 
 import numpy as np
@@ -40,18 +40,18 @@ def check_budget(taken: int, size: int) -> None:
         raise ValueError(f"its {size} bytes would take {taken}, and at most {most} are allowed")
 
 
-def text_lines(stream: BinaryIO) -> Iterator[str]:
+def text_lines(stream: BinaryIO) -> Iterator[bytes]:
     """Lines that are not blank; ValueError for a last one without an end: a number that was cut is another number."""
     for line in stream:
         if not line.isspace():
             if not line.endswith((b"\n", b"\r")):
                 raise ValueError("its last line may be cut inside a number: end it with a line break if it is whole")
-            yield line.decode("ascii", "replace")
+            yield line
 
 
-def number_rows(lines: Iterator[str], rows: int, columns: int) -> np.ndarray:
-    """The next rows of text, or those that are left, (n, columns) float array; more numbers in a row are left out."""
-    first = list(islice(lines, min(rows, 1)))
-    if not first:
-        return np.empty((0, columns))
-    return np.loadtxt(chain(first, islice(lines, rows - 1)), ndmin=2, comments=None, usecols=range(columns))
+def numbers(lines: Iterable[bytes]) -> np.ndarray:
+    """All numbers of lines of text, (n,) float array."""
+    values = array("d")
+    for line in lines:
+        values.extend(map(float, line.split()))
+    return np.array(values)

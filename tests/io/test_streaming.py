@@ -166,7 +166,7 @@ def test_columns_of_a_ply_file_keep_their_types_where_open3d_reads_these(ring, t
     (tmp_path / "scan.ply").write_bytes(head.encode() + rows.tobytes())
     annotate_file(ring, tmp_path / "scan.ply", tmp_path / "out.ply")
     with (tmp_path / "out.ply").open("rb") as stream:
-        found = ply.read_tables(stream, "vertex")["vertex"]
+        found = ply.read_tables(stream)["vertex"]
     renamed = {"red": "scan_red", "green": "scan_green", "blue": "scan_blue", "class": "class_"}
     for name, kind in kinds.items():
         values = found[renamed.get(name, name)]

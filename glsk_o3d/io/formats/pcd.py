@@ -1,12 +1,13 @@
 """PCD, the files of PCL: text, binary and compressed; every field with one value, read without trust."""
 
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 
-from ..paths import check_promised, number_rows, text_lines
+from ..paths import check_promised, numbers, text_lines
 from ..scan import Scan, scan_of
 
 _NORMALS = {f"normal_{axis}": f"n{axis}" for axis in "xyz"}
@@ -62,15 +63,15 @@ def _blocks(path: Path, start: int, row: np.dtype, points: int, binary: bool, ro
             yield _scan({name: table[name] for name in row.names or () if not bare or name[-2:] in _PLACE})
 
 
-def _text(lines: Iterator[str], row: np.dtype, n: int) -> np.ndarray:
-    """The next n rows, or those that are left."""
+@np.errstate(invalid="ignore")
+def _text(lines: Iterator[bytes], row: np.dtype, n: int) -> np.ndarray:
+    """The next n rows, or as many as remain."""
     names = row.names or ()
     ends = np.cumsum([row[name].shape[0] for name in names])
-    numbers = number_rows(lines, n, ends[-1])
-    table = np.empty(len(numbers), row)
-    with np.errstate(invalid="ignore"):
-        for name, values in zip(names, np.split(numbers, ends[:-1], axis=1), strict=True):
-            table[name] = values
+    values = numbers(islice(lines, n)).reshape(-1, ends[-1])
+    table = np.empty(len(values), row)
+    for name, columns in zip(names, np.split(values, ends[:-1], axis=1), strict=True):
+        table[name] = columns
     return table
 
 

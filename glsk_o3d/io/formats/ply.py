@@ -5,14 +5,16 @@ Skeletons have the radii as ``radius`` and ``quality``, by which MeshLab colours
 file that has edges and no faces. What a header promises and the file does not hold is an error.
 """
 
+from __future__ import annotations
+
 import io
 import os
 import struct
 from array import array
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from itertools import islice, repeat, takewhile
+from itertools import islice, takewhile
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
@@ -21,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from ...data.skeleton import Skeleton
 from ...interop.atomic import write_atomically
-from ..paths import check_promised, number_rows, text_lines
+from ..paths import check_promised, numbers, text_lines
 from ..scan import COLOR_CHANNELS, NO_TRIANGLES, NORMAL_NAMES, Scan, scan_of
 from .graphs import NoEdges, graph_skeleton
 
@@ -58,12 +60,16 @@ class Element(NamedTuple):
     columns: list[Column]
 
     @property
-    def has_lists(self) -> bool:
-        """Whether rows differ in length."""
-        return any(column.counts for column in self.columns)
+    def lists(self) -> list[str]:
+        """The names of the columns of lists: rows differ in length if there are any."""
+        return [column.name for column in self.columns if column.counts]
+
+    def as_text(self) -> Element:
+        """The same in text, all numbers of which are read as doubles."""
+        return self._replace(columns=[Column(name, "f8", counts and "f8") for name, _, counts in self.columns])
 
     def dtype(self, order: str, sizes: Mapping[str, int] = {}) -> np.dtype:
-        """A row of binary data in a byte order, if its lists have these sizes: with a column of counts for each."""
+        """A row in a byte order, if its lists have these sizes: with a column of counts for each."""
         fields: list[Any] = []
         for name, kind, counts in self.columns:
             if counts:
@@ -71,26 +77,31 @@ class Element(NamedTuple):
             fields.append((name, order + kind, (sizes[name],)) if counts else (name, order + kind))
         return np.dtype(fields)
 
-    def least(self, order: str) -> int:
-        """The bytes of a row at the least, in text two for a number: lists may be empty, but a face has a corner."""
+    def least(self) -> int:
+        """The bytes of all rows at the least: lists may be empty, but a face has a corner."""
         kinds = [column.counts or column.kind for column in self.columns]
         kinds += [column.kind for column in self.columns if column.counts and self.name == "face"]
-        return sum(np.dtype(kind).itemsize if order else 2 for kind in kinds)
+        return self.rows * sum(np.dtype(kind).itemsize for kind in kinds)
 
-    def check(self, held: int) -> None:
-        """Raise ValueError where there are less rows."""
-        check_promised(self.rows, held, "points" if self.name == "vertex" else f"rows of {self.name!r}")
+    def check(self, rows: int) -> None:
+        """Raise ValueError where the file has fewer rows."""
+        check_promised(self.rows, rows, "points" if self.name == "vertex" else f"rows of {self.name!r}")
 
 
-def check_elements(elements: list[Element], order: str, size: int) -> None:
-    """Raise ValueError where elements take more than so many bytes, or names repeat."""
-    at = 0
+def check_elements(elements: list[Element], size: int) -> None:
+    """Raise ValueError where elements take more than so many bytes, or fewer of several without lists, or names repeat.
+
+    After a wrong count what follows is shifted.
+    """
+    start = 0
     for element in elements:
         if len({column.name for column in element.columns}) < max(len(element.columns), element.rows > 0):
             raise ValueError(f"element {element.name!r} has two properties of one name, or none")
-        least = element.least(order)
-        element.check((size - at) // max(least, 1))
-        at += element.rows * least
+        element.check((size - start) * element.rows // max(element.least(), 1))
+        start += element.least()
+    filled = [element for element in elements if element.rows]
+    if start < size and len(filled) > 1 and not any(element.lists for element in filled):
+        raise ValueError(MORE_THAN_PROMISED)
 
 
 def read_header(stream: BinaryIO) -> tuple[str, list[Element]]:
@@ -134,98 +145,68 @@ class Lists(NamedTuple):
 
 
 Table = Mapping[str, Any]  # of arrays and lists
-Take = Callable[[str, int], Sequence[float]]
-"""Gives the next so many values of a type in a row."""
 
 
-def read_tables(stream: BinaryIO, *wanted: str) -> dict[str, Table]:
-    """Elements that a file has, columns by name; in text floats become float64. The others are read over: nothing may
-    lack.
-    """
+def read_tables(stream: BinaryIO) -> dict[str, Table]:
+    """The elements of a file, columns by name; in text floats become float64. ValueError where anything is missing."""
     order, elements = read_header(stream)
-    start = stream.tell()
-    end = stream.seek(0, os.SEEK_END)
-    check_elements(elements, order, end - start + (not order))  # the last line of text may have no end
-    stream.seek(start)
-    elements, tables = [element for element in elements if element.columns], dict[str, Table]()
-    if order:
-        data, at = stream.read(), 0
-        for element in elements:
-            tables[element.name], at = _binary(data, at, element, order)
-        rest = data[at : at + LONGEST_LINE].strip()
-    else:
-        lines = text_lines(stream)
-        for element in elements:
-            tables[element.name] = _text(lines, element)
-        rest = next(lines, "").encode()
-    if rest and sum(element.rows > 0 for element in elements) > 1:  # then a wrong count shifts what comes after it
+    data = stream.read() if order else numbers(text_lines(stream)).tobytes()
+    stored, order = (elements, order) if order else ([element.as_text() for element in elements], "=")
+    check_elements(stored, len(data))
+    tables: dict[str, Table] = {}
+    start = 0
+    for element, in_file in zip(elements, stored, strict=True):
+        if element.columns:
+            table, start = _table(data, start, in_file, order)
+            tables[element.name] = {name: _typed(table[name], kind) for name, kind, _ in element.columns}
+    several = sum(element.rows > 0 for element in elements) > 1
+    if data[start : start + LONGEST_LINE].strip() and (several or order == "="):
         raise ValueError(MORE_THAN_PROMISED)
-    return {name: table for name, table in tables.items() if name in wanted}
-
-
-def _text(lines: Iterator[str], element: Element) -> Table:
-    """The next rows of text as a table."""
-    if element.has_lists:
-        return _row_by_row(element, map(_words, islice(lines, element.rows)))
-    rows = number_rows(lines, element.rows, len(element.columns))
-    element.check(len(rows))
-    return {name: _typed(values, kind) for (name, kind, _), values in zip(element.columns, rows.T, strict=True)}
+    return tables
 
 
 @np.errstate(invalid="ignore")
-def _typed(values: np.ndarray, kind: str) -> np.ndarray:
-    """Numbers of text in the type of their column, but with all their digits."""
-    return values if kind[0] == "f" else values.astype(kind)
+def _typed(values: Any, kind: str) -> Any:
+    """Integers in the type of their column; floats of text keep all their digits."""
+    return values if isinstance(values, Lists) or kind[0] == "f" else values.astype(kind)
 
 
-def _words(line: str) -> Take:
-    words = iter(line.split())
-    return lambda kind, n: [float(word) for word in islice(words, n)]
-
-
-def _binary(data: bytes, start: int, element: Element, order: str) -> tuple[Table, int]:
-    """A table and where it ends; at once if its lists are all as long as in the first row."""
-    at = start
-
-    def take(kind: str, n: int) -> Sequence[float]:
-        nonlocal at
-        before, at = at, at + n * np.dtype(kind).itemsize
-        check_promised(at, len(data), "bytes")
-        return struct.unpack_from(f"{order}{n}{np.dtype(kind).char}", data, before)
-
-    lists = [column.name for column in element.columns if column.counts]
-    first = _row_by_row(element._replace(rows=1), [take]) if lists and element.rows else {}
-    sizes = {name: len(first[name].values) if first else 0 for name in lists}
+def _table(data: bytes, start: int, element: Element, order: str) -> tuple[Table, int]:
+    """The columns of an element and where it ends; at once if its lists are all as long as in the first row."""
+    first = _row_by_row(data, start, element._replace(rows=min(element.rows, 1)), order)[0] if element.lists else {}
+    sizes = {name: len(first[name].values) for name in element.lists}
     row = element.dtype(order, sizes)
     end = start + element.rows * row.itemsize
     if end <= len(data):
         rows = np.frombuffer(data[start:end], row)
         if all((rows[f"{name} count"] == size).all() for name, size in sizes.items()):
-            counted = {name: Lists(rows[f"{name} count"], rows[name].ravel()) for name in sizes}
-            return {column.name: rows[column.name] for column in element.columns} | counted, end
-    element.check(element.rows if sizes else (len(data) - start) // row.itemsize)
-    at = start
-    return _row_by_row(element, repeat(take, element.rows)), at
+            lists = {name: Lists(rows[f"{name} count"], rows[name].ravel()) for name in sizes}
+            return {column.name: rows[column.name] for column in element.columns} | lists, end
+    return _row_by_row(data, start, element, order)
 
 
-def _row_by_row(element: Element, rows: Iterable[Take]) -> Table:
-    """A table whose rows differ in length."""
-    found = [(array("q"), array("d")) for _ in element.columns]
-    for take in rows:
-        for (_, kind, counted), (counts, values) in zip(element.columns, found, strict=True):
+def _row_by_row(data: bytes, start: int, element: Element, order: str) -> tuple[Table, int]:
+    """The same where rows differ in length."""
+
+    def take(kind: str, n: int) -> Sequence[float]:
+        nonlocal start
+        before, start = start, start + n * np.dtype(kind).itemsize
+        check_promised(start, len(data), "bytes")
+        return struct.unpack_from(f"{order}{n}{np.dtype(kind).char}", data, before)
+
+    columns = [(array("q"), array("d")) for _ in element.columns]
+    for _ in range(element.rows):
+        for (_, kind, counted), (counts, values) in zip(element.columns, columns, strict=True):
             promised = take(counted, 1)[0] if counted else 1
             n = int(promised)
             if not 0 <= n == promised:
                 raise ValueError(f"a list of {element.name!r} has an impossible number of values")
-            held = take(kind, n)
-            check_promised(n, len(held), f"numbers in a row of {element.name!r}")
             counts.append(n)
-            values.extend(held)
-    element.check(len(found[0][0]))
+            values.extend(take(kind, n))
     return {
-        name: Lists(np.array(counts), np.array(values)) if counted else _typed(np.array(values), kind)
-        for (name, kind, counted), (counts, values) in zip(element.columns, found, strict=True)
-    }
+        name: Lists(np.array(counts), np.array(values)) if counted else np.array(values)
+        for (name, _, counted), (counts, values) in zip(element.columns, columns, strict=True)
+    }, start
 
 
 # ----------------------------------------------------------------------------------------------------------- skeletons
@@ -244,7 +225,7 @@ def write(skeleton: Skeleton) -> bytes:
 
 def read(data: bytes) -> Skeleton:
     """The skeleton in the content of a PLY file."""
-    tables = read_tables(io.BytesIO(data), "vertex", "edge")
+    tables = read_tables(io.BytesIO(data))
     if "edge" not in tables:
         raise NoEdges
     vertex, edge = tables["vertex"], tables["edge"]
@@ -262,22 +243,19 @@ def blocks(path: Path, rows: int, bare: bool) -> tuple[int | None, Iterator[Scan
     with path.open("rb") as stream:
         order, elements = read_header(stream)
         start = stream.tell()
-    held = {element.name: element for element in elements if element.rows}
-    if not order or "vertex" not in held or any(element.has_lists for element in held.values()):
+    filled = {element.name: element for element in elements if element.rows}
+    if not order or "vertex" not in filled or any(element.lists for element in filled.values()):
         return None, map(_whole, [path])
-    size = path.stat().st_size - start
-    check_elements(elements, order, size)
-    if len(held) > 1 and size > sum(element.rows * element.least(order) for element in held.values()):
-        raise ValueError(MORE_THAN_PROMISED)
-    for element in takewhile(lambda element: element.name != "vertex", elements):
-        start += element.rows * element.least(order)
-    vertex = held["vertex"]
+    check_elements(elements, path.stat().st_size - start)
+    before = takewhile(lambda element: element.name != "vertex", elements)
+    start += sum(element.least() for element in before)
+    vertex = filled["vertex"]
     return vertex.rows, _blocks(path, start, vertex.dtype(order), vertex.rows, rows, bare)
 
 
 def _whole(path: Path) -> Scan:
     with path.open("rb") as stream:
-        tables = read_tables(stream, "vertex", "face")
+        tables = read_tables(stream)
     if "vertex" not in tables:
         raise ValueError("it has no element 'vertex'")
     scan = _scan(tables["vertex"])
