@@ -13,6 +13,7 @@ __all__ = ["Cloud", "cloud_points"]
 ACCEPTED = "an Open3D point cloud or triangle mesh (legacy or tensor) or an (N, 3) array of real numbers"
 SAMPLE_COUNT = "sample_count"
 """The attribute of a tensor cloud that says how many points of a larger one each stands for."""
+NO_ROWS = np.empty((0, 3))
 MOST_COUNTED = np.nextafter(2.0**63, 0)  # derived: the last float that int64 holds
 
 
@@ -41,13 +42,17 @@ class SurfaceMesh(NamedTuple):
     triangles: np.ndarray  # (T, 3) int
 
 
+class Content(NamedTuple):
+    """The arrays of what carries points, unchecked."""
+
+    points: Any
+    triangles: Any = ()
+    counts: Any = None
+
+
 def surface_mesh(cloud: Any) -> SurfaceMesh:
-    """What `cloud_points` gives, and the triangles; InvalidCloudError also for one with a corner that is missing."""
-    points, kind = cloud_points(cloud), open3d_class(cloud)
-    held = cloud.triangles if isinstance(cloud, SurfaceMesh) or kind == ("TriangleMesh", False) else ()
-    if kind == ("TriangleMesh", True) and "indices" in cloud.triangle:
-        held = cloud.triangle.indices.cpu().numpy()
-    triangles = np.asarray(held, np.int64).reshape(-1, 3)
+    """The points as of `cloud_points`, and the triangles; InvalidCloudError also for a corner that is no vertex."""
+    points, triangles = cloud_points(cloud), np.asarray(_content(cloud).triangles, np.int64).reshape(-1, 3)
     if not ((triangles >= 0) & (triangles < len(points))).all():
         raise InvalidCloudError(f"a triangle has a corner that is none of the {len(points)} vertices of its mesh")
     return SurfaceMesh(points, triangles)
@@ -81,9 +86,9 @@ def cloud_points(cloud: Any) -> np.ndarray:
         raise InvalidCloudError(f"a cloud is not a file name ({cloud!r}): read it first with glsk_o3d.read_cloud")
     if isinstance(cloud, np.ma.MaskedArray):
         raise InvalidCloudError("a cloud cannot be a masked array: drop the masked points, or fill them with NaN")
-    held = _held(cloud)
+    points = _content(cloud).points
     try:
-        array = np.asarray(held)
+        array = np.asarray(points)
     except Exception as error:  # ragged lists, and whatever a foreign __array__ raises
         raise InvalidCloudError(f"a {type(cloud).__name__} is no cloud ({error}): give {ACCEPTED}") from error
     if array.size == 0 and array.dtype.kind in "iuf":
@@ -101,12 +106,10 @@ def cloud_counts(cloud: Any, finite: np.ndarray) -> tuple[np.ndarray | None, int
     (n,) float array, the attribute ``sample_count`` of a tensor cloud, or those of CountedPoints, None if there are
     none; and two ints, the sums for the finite points and for all others. InvalidCloudError if they are no counts.
     """
-    held = cloud.counts if isinstance(cloud, CountedPoints) else None
-    if open3d_class(cloud) == ("PointCloud", True) and SAMPLE_COUNT in cloud.point:
-        held = cloud.point[SAMPLE_COUNT].cpu().numpy()
-    if held is None:
+    counts, n = _content(cloud).counts, len(finite)
+    if counts is None:
         return None, int(finite.sum()), int((~finite).sum())
-    counts, n = held.astype(float), len(finite)
+    counts = counts.astype(float)
     if not (counts.shape in ((n, 1), (n,)) and (counts >= 1).all() and counts.sum() <= MOST_COUNTED):
         raise InvalidCloudError(
             f"the cloud's attribute {SAMPLE_COUNT} of shape {counts.shape} must be the number of points that each "
@@ -116,21 +119,29 @@ def cloud_counts(cloud: Any, finite: np.ndarray) -> tuple[np.ndarray | None, int
     return counts[finite], int(counts[finite].sum()), int(counts[~finite].sum())
 
 
-def _held(cloud: Any) -> Any:
-    """The array-like in an Open3D object, or `cloud` itself; knows Open3D's classes by name, so as not to import it."""
-    if isinstance(cloud, CountedPoints | SurfaceMesh):
-        return cloud[0]
+def _content(cloud: Any) -> Content:
+    """The arrays in a cloud, which may be `cloud` itself; Open3D's classes by name, so as not to import it."""
+    if isinstance(cloud, CountedPoints):
+        return Content(cloud.points, counts=cloud.counts)
+    if isinstance(cloud, SurfaceMesh):
+        return Content(*cloud)
     name, tensor = open3d_class(cloud)
-    if name == "Tensor":
-        return cloud.cpu().numpy()
-    if name in ("PointCloud", "TriangleMesh"):
-        if not tensor:
-            return cloud.points if name == "PointCloud" else cloud.vertices
-        attributes = cloud.point if name == "PointCloud" else cloud.vertex
-        return attributes.positions.cpu().numpy() if "positions" in attributes else np.empty((0, 3))
     if name == "" or name.endswith("Vector"):
-        return cloud
-    raise InvalidCloudError(f"an Open3D {name} is no cloud: give {ACCEPTED}")
+        return Content(cloud)
+    if name == "Tensor":
+        return Content(cloud.cpu().numpy())
+    if name not in ("PointCloud", "TriangleMesh"):
+        raise InvalidCloudError(f"an Open3D {name} is no cloud: give {ACCEPTED}")
+    if not tensor:
+        return Content(cloud.points) if name == "PointCloud" else Content(cloud.vertices, cloud.triangles)
+    if name == "PointCloud":
+        return Content(_array(cloud.point, "positions", NO_ROWS), counts=_array(cloud.point, SAMPLE_COUNT, None))
+    return Content(_array(cloud.vertex, "positions", NO_ROWS), _array(cloud.triangle, "indices", NO_ROWS))
+
+
+def _array(attributes: Any, name: str, default: np.ndarray | None) -> np.ndarray | None:
+    """An attribute of a tensor geometry, or the default if it has none of this name."""
+    return attributes[name].cpu().numpy() if name in attributes else default
 
 
 def open3d_class(thing: Any) -> tuple[str, bool]:

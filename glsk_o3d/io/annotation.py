@@ -10,6 +10,7 @@ from ..data.skeleton import Skeleton
 from ..interop.clouds import open3d_class
 from ..interop.packages import import_open3d
 from .colors import ColorChoice, shades
+from .scan import color_bytes
 
 
 def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None = None) -> Any:
@@ -55,40 +56,43 @@ def annotate(skeleton: Skeleton, cloud: Any = None, *, color: ColorChoice | None
     SizeVector[1000, 1]
     """
     points, vertex = vertex_of_cloud(skeleton, cloud)
-    found = labels(skeleton, points, vertex, color)
-    given: Any = points if cloud is None else cloud
-    o3d = import_open3d()
-    name, tensor = open3d_class(given)
-    if name in ("PointCloud", "TriangleMesh"):
-        kind = getattr(o3d.t.geometry, name)
-        geometry = given.clone() if tensor else kind.from_legacy(given, o3d.core.float64)
-    else:
-        array = given.cpu().numpy() if name == "Tensor" else np.asarray(given)
-        array = np.array(array, np.float32 if array.dtype == np.float32 else np.float64, order="C")
-        geometry = o3d.t.geometry.PointCloud(o3d.core.Tensor(array))
-    held = geometry.vertex if name == "TriangleMesh" else geometry.point
-    positions = held.positions
-    own = positions.dtype if positions.dtype in (o3d.core.float32, o3d.core.float64) else o3d.core.float64
-    if "colors" in found and name == "TriangleMesh":
-        found["colors"] = found["colors"] / 255  # Open3D writes meshes in other colours than floats white
-    for key, values in found.items():
+    named = labels(skeleton, points, vertex, color)
+    geometry = _tensor_geometry(points if cloud is None else cloud)
+    core = import_open3d().core
+    attributes, is_mesh = (geometry.vertex, True) if "Mesh" in type(geometry).__name__ else (geometry.point, False)
+    positions = attributes.positions
+    real = positions.dtype if positions.dtype in (core.float32, core.float64) else core.float64
+    if "colors" in named and is_mesh:
+        named["colors"] = named["colors"] / 255  # Open3D writes meshes in other colours than floats white
+    for key, values in named.items():
         values = np.ascontiguousarray(values).reshape(len(values), -1)
-        held[key] = o3d.core.Tensor(values, own if values.dtype.kind == "f" else None, positions.device)
+        attributes[key] = core.Tensor(values, real if values.dtype.kind == "f" else None, positions.device)
     return geometry
+
+
+def _tensor_geometry(cloud: Any) -> Any:
+    """A cloud or mesh as a tensor cloud or mesh of its own."""
+    o3d, (name, tensor) = import_open3d(), open3d_class(cloud)
+    if name in ("PointCloud", "TriangleMesh"):
+        return cloud.clone() if tensor else getattr(o3d.t.geometry, name).from_legacy(cloud, o3d.core.float64)
+    array = cloud.cpu().numpy() if name == "Tensor" else np.asarray(cloud)
+    kind = np.float32 if array.dtype == np.float32 else np.float64
+    return o3d.t.geometry.PointCloud(o3d.core.Tensor(np.array(array, kind, order="C")))
 
 
 def labels(
     skeleton: Skeleton, points: np.ndarray, vertex: np.ndarray, color: ColorChoice | None = None
 ) -> dict[str, np.ndarray]:
-    """What `annotate` says of points that belong to vertices, -1 for none: (N,) arrays by name; integers are int32, and
-    ``colors`` (N, 3) uint8, if asked for.
+    """The attributes of `annotate` for points that belong to vertices, -1 for none: (N,) arrays by name.
+
+    Integers are int32; ``colors`` are (N, 3) uint8, if asked for.
     """
     branch = branch_of_point(skeleton, points, vertex)
     orders = np.where(branch >= 0, branch_table(skeleton).order[branch], -1)
-    whole = {"skeleton_vertex": vertex, "branch": branch, "order": orders}
-    found = {name: values.astype(np.int32) for name, values in whole.items()}
+    integers = {"skeleton_vertex": vertex, "branch": branch, "order": orders}
+    named = {name: values.astype(np.int32) for name, values in integers.items()}
     for name, values in (("radius", skeleton.radii), ("confidence", skeleton.confidence)):
-        found[name] = np.where(vertex >= 0, values[vertex], np.nan)
+        named[name] = np.where(vertex >= 0, values[vertex], np.nan)
     if color is not None:
-        found["colors"] = np.round(255 * shades(skeleton, color, branch, vertex)).astype(np.uint8)
-    return found
+        named["colors"] = color_bytes(shades(skeleton, color, branch, vertex))
+    return named

@@ -76,27 +76,35 @@ class Scan:
             chosen &= compare(columns[known], value)
         return chosen
 
-    @property
-    def shades(self) -> np.ndarray | None:
-        """The colours from 0 to 255, (N, 3) uint8 array or None."""
-        return None if self.colors is None else np.round(255 * np.clip(self.colors, 0, 1)).astype(np.uint8)
+    @classmethod
+    def of_mesh(cls, mesh: Any) -> Scan:
+        """Of an ``open3d.geometry.TriangleMesh``."""
+        colors = np.asarray(mesh.vertex_colors) if mesh.has_vertex_colors() else None
+        normals = np.asarray(mesh.vertex_normals) if mesh.has_vertex_normals() else None
+        return cls(np.asarray(mesh.vertices), colors, normals, triangles=np.asarray(mesh.triangles))
+
+    def to_mesh(self) -> Any:
+        """As an ``open3d.geometry.TriangleMesh``, without attributes."""
+        o3d = import_open3d()
+        corners = o3d.utility.Vector3iVector(self.triangles.astype(np.int32))
+        return self._with_looks(o3d.geometry.TriangleMesh(_vectors(self.positions), corners), "vertex_")
 
     def to_legacy(self) -> Any:
-        """As an ``open3d.geometry.PointCloud``, which has no place for attributes."""
-        vectors = import_open3d().utility.Vector3dVector
-        cloud = import_open3d().geometry.PointCloud(vectors(self.positions))
+        """As an ``open3d.geometry.PointCloud``, without attributes."""
+        return self._with_looks(import_open3d().geometry.PointCloud(_vectors(self.positions)), "")
+
+    def _with_looks(self, geometry: Any, prefix: str) -> Any:
         for name in ("colors", "normals"):
-            values = getattr(self, name)
-            if values is not None:
-                setattr(cloud, name, vectors(np.ascontiguousarray(values, float)))
-        return cloud
+            if (values := getattr(self, name)) is not None:
+                setattr(geometry, prefix + name, _vectors(values))
+        return geometry
 
     def to_tensor(self) -> Any:
         """As an ``open3d.t.geometry.PointCloud`` with everything."""
         o3d = import_open3d()
         cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(np.ascontiguousarray(self.positions, float)))
-        if (shades := self.shades) is not None:
-            cloud.point.colors = o3d.core.Tensor(shades)
+        if self.colors is not None:
+            cloud.point.colors = o3d.core.Tensor(color_bytes(self.colors))
         if self.normals is not None:
             cloud.point.normals = o3d.core.Tensor(np.ascontiguousarray(self.normals, float))
         for name, values in self.attributes.items():  # integers as int32 if they fit: Open3D writes no int64
@@ -106,11 +114,20 @@ class Scan:
         return cloud
 
 
+def _vectors(rows: np.ndarray) -> Any:
+    return import_open3d().utility.Vector3dVector(np.ascontiguousarray(rows, float))
+
+
+def color_bytes(colors: np.ndarray) -> np.ndarray:
+    """Colours from 0 to 1 as uint8 from 0 to 255."""
+    return np.round(255 * np.clip(colors, 0, 1)).astype(np.uint8)
+
+
 def parsed(where: str) -> list[tuple[str, Callable[[Any, Any], Any], Any]]:
     """The comparisons that a condition joins by ``and``: the name of an attribute, how it is compared, and with what
     number or, behind ``in``, numbers. InvalidParameterError if it is no condition.
     """
-    found = []
+    comparisons = []
     for part in re.split(r"\band\b", where):
         try:
             name, sign, number, listed = re.fullmatch(_COMPARISON, part.strip()).groups()  # type: ignore[union-attr]
@@ -120,8 +137,8 @@ def parsed(where: str) -> list[tuple[str, Callable[[Any, Any], Any], Any]]:
                 f"where = {where[:200]!r}: {part.strip()[:80]!r} is not understood: compare attributes with numbers, "
                 "such as 'classification in (2, 5) and z > 1.5'"
             ) from None
-        found.append((name, _SIGNS[sign or "in"], value))
-    return found
+        comparisons.append((name, _SIGNS[sign or "in"], value))
+    return comparisons
 
 
 def scan_of(columns: Mapping[str, np.ndarray], top: float | None = None) -> Scan:
@@ -131,14 +148,13 @@ def scan_of(columns: Mapping[str, np.ndarray], top: float | None = None) -> Scan
     Colours are numbers up to 255 or 65535, or up to 1 if they are no integers; `top` is the brightest in the file if
     these are only some of its points. Where they are all 0 they are none.
     """
-    left = dict(columns)
+    others = dict(columns)
 
-    def together(names: list[str]) -> np.ndarray | None:
-        if not set(names) <= left.keys():
-            return None
-        return np.column_stack([left.pop(name) for name in names])
+    def taken(names: list[str]) -> np.ndarray | None:
+        """Those columns side by side, if there are all."""
+        return np.column_stack([others.pop(name) for name in names]) if set(names) <= others.keys() else None
 
-    positions, colors, normals = (together(names) for names in ([*"xyz"], COLOR_CHANNELS, NORMAL_NAMES))
+    positions, colors, normals = map(taken, ([*"xyz"], COLOR_CHANNELS, NORMAL_NAMES))
     if positions is None:
         raise ValueError("it has no x, y and z")
     if colors is not None:
@@ -146,19 +162,15 @@ def scan_of(columns: Mapping[str, np.ndarray], top: float | None = None) -> Scan
         scale = 1 if top <= 1 and colors.dtype.kind == "f" else 255 if top <= 255 else 65535
         colors = colors / scale if top else None
     attributes: dict[str, np.ndarray] = {}
-    for text, values in left.items():
+    for text, values in others.items():
         name = re.sub(r"\W+", "_", text).strip("_") or "column"
         name = f"column_{name}" if name[0].isdigit() else f"{name}_" if iskeyword(name) else name
         while name in {*"xyz", "positions", "colors", "normals", *attributes}:
             name += "_2"
         attributes[name] = values.astype(values.dtype.newbyteorder("="))
-    return Scan(
-        np.ascontiguousarray(positions, float),
-        colors,
-        None if normals is None else np.ascontiguousarray(normals, float),
-        attributes,
-        single=columns["x"].dtype.str[1:] == "f4",
-    )
+    positions = positions.astype(float, copy=False)
+    normals = None if normals is None else normals.astype(float, copy=False)
+    return Scan(positions, colors, normals, attributes, single=columns["x"].dtype.str[1:] == "f4")
 
 
 def brightest(values: np.ndarray) -> float:

@@ -7,8 +7,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-
 from ..errors import FileFormatError, InvalidCloudError, MissingPackageError, brief
 from ..interop.atomic import existing_file
 from ..interop.packages import import_open3d
@@ -30,13 +28,10 @@ def _whole(read: Callable[[Path], Scan]) -> Reader:
 
 
 def _opened_by_open3d(path: Path) -> Scan:
-    """The vertices of a file that Open3D reads, and the triangles between them."""
+    """The vertices of a mesh that Open3D reads, and its triangles."""
     o3d = import_open3d()
     with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-        mesh = o3d.io.read_triangle_mesh(str(path))
-    colors = np.asarray(mesh.vertex_colors) if mesh.has_vertex_colors() else None
-    normals = np.asarray(mesh.vertex_normals) if mesh.has_vertex_normals() else None
-    return Scan(np.asarray(mesh.vertices), colors, normals, {}, np.asarray(mesh.triangles))
+        return Scan.of_mesh(o3d.io.read_triangle_mesh(str(path)))
 
 
 _SCAN_READERS: dict[str, Reader] = {
@@ -136,15 +131,10 @@ def read_mesh(path: str | os.PathLike[str]) -> Any:
     endings = (".ply", *MESH_ENDINGS)
     if not str(path).lower().endswith(endings):
         raise FileFormatError(f"{path}: unknown ending of a mesh; known are {', '.join(endings)}")
-    scan, o3d = next(read_blocks(path, rows=ALL_ROWS)), import_open3d()
+    scan = read_scan(path)
     if not len(scan.triangles):
         raise FileFormatError(f"{path}: no triangles could be read: it is a cloud, or damaged")
-    vectors, corners = o3d.utility.Vector3dVector, o3d.utility.Vector3iVector
-    mesh = o3d.geometry.TriangleMesh(vectors(scan.positions), corners(scan.triangles.astype(np.int32)))
-    for name, values in (("vertex_normals", scan.normals), ("vertex_colors", scan.colors)):
-        if values is not None:
-            setattr(mesh, name, vectors(values))
-    return mesh
+    return scan.to_mesh()
 
 
 def read_blocks(

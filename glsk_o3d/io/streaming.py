@@ -20,7 +20,7 @@ from ..parameters import check_number
 from ..pipeline import Pipeline
 from .annotation import labels
 from .formats import ply
-from .scan import COLOR_CHANNELS, Scan
+from .scan import COLOR_CHANNELS, Scan, color_bytes
 from .scans import promised_points, read_blocks, read_scan
 
 LABELLED_ENDING = ".ply"
@@ -185,21 +185,22 @@ def annotate_file(
         nonlocal n
         for block in read_blocks(path, where=where):
             vertex = vertex_of_cloud(skeleton, block.positions)[1]
-            found = labels(skeleton, block.positions, vertex, "branch")
-            n = ply.append(temporary, ply.rows_of(_columns(block, found)), n)
+            named = labels(skeleton, block.positions, vertex, "branch")
+            n = ply.append(temporary, ply.rows_of(_columns(block, named)), n)
 
     write_atomically(output, write)
     return n
 
 
-def _columns(block: Scan, found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _columns(block: Scan, named: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Columns of a PLY file, by name: those of a scan, and labels."""
-    held = {"positions": block.positions, **block.attributes, **found}
+    arrays = {"positions": block.positions, **block.attributes, **named}
     if block.normals is not None:
-        held["normals"] = block.normals
-    if (shades := block.shades) is not None:
-        held |= {f"scan_{name}": shades[:, i] for i, name in enumerate(COLOR_CHANNELS)}
+        arrays["normals"] = block.normals
+    if block.colors is not None:
+        names = [f"scan_{name}" for name in COLOR_CHANNELS]
+        arrays |= dict(zip(names, color_bytes(block.colors).T, strict=True))
     if block.single:
-        ours = {"positions", "normals", *found}
-        held |= {name: held[name].astype(np.float32) for name in ours & held.keys() if held[name].dtype == float}
-    return ply.columns_of(held)
+        own = {"positions", "normals", *named}
+        arrays |= {name: arrays[name].astype(np.float32) for name in own & arrays.keys() if arrays[name].dtype == float}
+    return ply.columns_of(arrays)

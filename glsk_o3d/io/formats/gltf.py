@@ -17,11 +17,12 @@ from ...data.skeleton import Skeleton
 from ...errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ...geometry.vectors import norm, unit
 from ...interop.atomic import check_ending, write_atomically
-from ...interop.clouds import cloud_points, open3d_class
+from ...interop.clouds import open3d_class, surface_mesh
 from ..geometry import to_tubes
 from .graphs import as_forest, global_shift, holding_all
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942  # published: glTF 2.0, 4.4
+ARRAY_TYPES = {(): "SCALAR", (3,): "VEC3", (4,): "VEC4", (16,): "MAT4"}  # published: glTF 2.0, 3.6.2.2
 COMPONENT_TYPES = {"f4": 5126, "u2": 5123, "u4": 5125}  # published: glTF 2.0, 3.6.2.2
 POINTS_MODE, TRIANGLES_MODE = 0, 4  # published: glTF 2.0, 5.24
 RIG_ENDING = ".glb"
@@ -118,29 +119,30 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
     if len(forest.edges) > MOST_JOINTS:
         raise FileFormatError(f"glTF counts at most {MOST_JOINTS} bones, not {len(forest.edges)}: simplify it first")
     mesh = mesh.to_legacy() if open3d_class(mesh) in (("PointCloud", True), ("TriangleMesh", True)) else mesh
-    points = cloud_points(mesh)
-    if not np.isfinite(points).all():
-        raise InvalidCloudError("the surface has points that are not finite: drop them first")
-    (low, high), (least, most) = ((each.min(axis=0), each.max(axis=0)) for each in (forest.vertices, points))
-    if max((least - high).max(), (low - most).max()) > np.linalg.norm(high - low):  # its own size away
-        raise InvalidCloudError("the surface is not where the skeleton is: are they in the same units and place?")
-    origin, buffer = global_shift(forest), _Buffer()
-    nodes, heads = _bones(forest, origin)
+    points, triangles = surface_mesh(mesh)
+    _check_place(forest, points)
+    origin, arrays = global_shift(forest), list[np.ndarray]()
+
+    def array(values: np.ndarray, kind: str) -> int:
+        """The number by which an array of this type is known."""
+        arrays.append(np.ascontiguousarray(values, kind))
+        return len(arrays) - 1
+
     bones, weights = skin_weights(forest, points, vertex_of_cloud(forest, points)[1])
     weights[:, 1:] = np.round(weights[:, 1:] * WEIGHT_STEPS) / WEIGHT_STEPS
     weights[:, 0] = 1 - weights[:, 1:].sum(axis=1)
-    inverse = np.tile(np.eye(4), (len(heads), 1, 1))
-    inverse[:, :3, 3] = -heads
     attributes = {
-        "POSITION": buffer.add(points - origin, "f4", "VEC3", bounds=True),
-        "JOINTS_0": buffer.add(bones * (weights > 0), "u2", "VEC4"),
-        "WEIGHTS_0": buffer.add(weights, "f4", "VEC4"),
-        **{name: buffer.add(values, "f4", "VEC3") for name, values in _looks(mesh, len(points)).items()},
+        "POSITION": array(points - origin, "<f4"),
+        "JOINTS_0": array(bones * (weights > 0), "<u2"),
+        "WEIGHTS_0": array(weights, "<f4"),
+        **{name: array(values, "<f4") for name, values in _looks(mesh, len(points)).items()},
     }
     primitive: dict[str, Any] = {"attributes": attributes, "mode": POINTS_MODE}
-    triangles = np.asarray(mesh.triangles) if open3d_class(mesh)[0] == "TriangleMesh" else np.empty((0, 3))
     if len(triangles):
-        primitive |= {"indices": buffer.add(triangles.reshape(-1), "u4", "SCALAR"), "mode": TRIANGLES_MODE}
+        primitive |= {"indices": array(triangles.reshape(-1), "<u4"), "mode": TRIANGLES_MODE}
+    joints, places = _joints(forest, origin)
+    at_rest = np.tile(np.eye(4), (len(places), 1, 1))  # by columns
+    at_rest[:, 3, :3] = -places
     x, y, z = origin.tolist()
     armature = {
         "name": "armature",
@@ -148,72 +150,77 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
         "translation": [x, z, -y] if up == "z" else [x, y, z],
         "rotation": UPRIGHT[up],
     }
-    n, at_rest = len(nodes), buffer.add(inverse.transpose(0, 2, 1).reshape(-1, 16), "f4", "MAT4")
-    return buffer.file(
-        {
-            "scene": 0,
-            "scenes": [{"nodes": [n, n + 1]}],
-            "nodes": [*nodes, armature, {"name": "surface", "mesh": 0, "skin": 0}],
-            "meshes": [{"primitives": [primitive]}],
-            "skins": [{"joints": list(range(n)), "skeleton": n, "inverseBindMatrices": at_rest}],
-        }
-    )
+    n = len(joints)
+    skin = {"joints": list(range(n)), "skeleton": n, "inverseBindMatrices": array(at_rest.reshape(-1, 16), "<f4")}
+    scene = {
+        "scene": 0,
+        "scenes": [{"nodes": [n, n + 1]}],
+        "nodes": [*joints, armature, {"name": "surface", "mesh": 0, "skin": 0}],
+        "meshes": [{"primitives": [primitive]}],
+        "skins": [skin],
+    }
+    return _glb(scene, arrays)
+
+
+def _check_place(forest: Skeleton, points: np.ndarray) -> None:
+    """InvalidCloudError unless the points of a surface are finite, and near the skeleton for its size."""
+    if not np.isfinite(points).all():
+        raise InvalidCloudError("the surface has points that are not finite: drop them first")
+    low, high = forest.vertices.min(axis=0), forest.vertices.max(axis=0)
+    gap = max((points.min(axis=0) - high).max(), (low - points.max(axis=0)).max())
+    if gap > np.linalg.norm(high - low):
+        raise InvalidCloudError("the surface is not where the skeleton is: are they in the same units and place?")
 
 
 def _looks(mesh: Any, n: int) -> dict[str, np.ndarray]:
-    """Normals and colours, where there is one of each vertex; colours are linear in glTF."""
-    kind, found = open3d_class(mesh)[0], {}
-    if kind in ("PointCloud", "TriangleMesh"):
-        of_vertices = "" if kind == "PointCloud" else "vertex_"
-        normals, shades = (np.asarray(getattr(mesh, f"{of_vertices}{name}")) for name in ("normals", "colors"))
-        if len(normals) == n and (norm(normals) > 0).all():
-            found["NORMAL"] = unit(normals)
-        if len(shades) == n:
-            found["COLOR_0"] = np.where(shades <= SRGB_KNEE, shades / 12.92, ((shades + 0.055) / 1.055) ** 2.4)
-    return found
+    """Normals and colours, where each vertex has one; colours are linear in glTF."""
+    prefix = {"PointCloud": "", "TriangleMesh": "vertex_"}.get(open3d_class(mesh)[0])
+    if prefix is None:
+        return {}
+    looks = {}
+    normals, colors = (np.asarray(getattr(mesh, prefix + name)) for name in ("normals", "colors"))
+    if len(normals) == n and (norm(normals) > 0).all():
+        looks["NORMAL"] = unit(normals)
+    if len(colors) == n:
+        looks["COLOR_0"] = np.where(colors <= SRGB_KNEE, colors / 12.92, ((colors + 0.055) / 1.055) ** 2.4)
+    return looks
 
 
-def _bones(forest: Skeleton, origin: np.ndarray) -> tuple[list[dict[str, Any]], np.ndarray]:
-    """The joints, one per edge, each placed from the one before it; and where they are from the origin."""
-    heads, parent = forest.vertices[forest.edges[:, 0]] - origin, bone_before(forest)
-    moved = np.where((parent >= 0)[:, None], heads - heads[parent], heads)
-    nodes: list[dict[str, Any]] = [
-        {"name": name, "translation": place} for name, place in zip(bone_names(forest), moved.tolist(), strict=True)
+def _joints(forest: Skeleton, origin: np.ndarray) -> tuple[list[dict[str, Any]], np.ndarray]:
+    """The joints, one per edge, each placed relative to the one before; and their places relative to the origin."""
+    places, parent = forest.vertices[forest.edges[:, 0]] - origin, bone_before(forest)
+    steps = np.where((parent >= 0)[:, None], places - places[parent], places)
+    joints: list[dict[str, Any]] = [
+        {"name": name, "translation": step} for name, step in zip(bone_names(forest), steps.tolist(), strict=True)
     ]
     for child, bone in enumerate(parent.tolist()):
         if bone >= 0:
-            nodes[bone].setdefault("children", []).append(child)
-    return nodes, heads
+            joints[bone].setdefault("children", []).append(child)
+    return joints, places
 
 
-class _Buffer:
-    """Arrays one after another, and what glTF says of each."""
+def _glb(scene: dict[str, Any], arrays: list[np.ndarray]) -> bytes:
+    """A binary file of a scene and the arrays that it names by their numbers."""
+    body, views, accessors = b"", [], []
+    for number, values in enumerate(arrays):
+        views.append({"buffer": 0, "byteOffset": len(body), "byteLength": values.nbytes})
+        limits = {
+            name: np.atleast_1d(value).tolist() for name, value in (("min", values.min(0)), ("max", values.max(0)))
+        }
+        facts = {"bufferView": number, "componentType": COMPONENT_TYPES[values.dtype.str[1:]], "count": len(values)}
+        accessors.append({**facts, "type": ARRAY_TYPES[values.shape[1:]], **limits})
+        body += _padded(values.tobytes(), b"\0")
+    scene |= {"accessors": accessors, "bufferViews": views, "buffers": [{"byteLength": len(body)}]}
+    scene |= {"asset": {"version": "2.0", "generator": "glsk-o3d"}}
+    text = _padded(json.dumps(scene, separators=(",", ":"), allow_nan=False).encode(), b" ")
+    chunks = b"".join(_words(len(data), kind) + data for data, kind in ((text, JSON_CHUNK), (body, BINARY_CHUNK)))
+    return _words(MAGIC, 2, 12 + len(chunks)) + chunks
 
-    def __init__(self) -> None:
-        self.data = bytearray()
-        self.views: list[dict[str, Any]] = []
-        self.accessors: list[dict[str, Any]] = []
 
-    def add(self, values: np.ndarray, kind: str, shape: str, *, bounds: bool = False) -> int:
-        """The number by which an array is known."""
-        array = np.ascontiguousarray(values, f"<{kind}")
-        self.data += bytes(-len(self.data) % 4)
-        self.views.append({"buffer": 0, "byteOffset": len(self.data), "byteLength": array.nbytes})
-        facts = {"bufferView": len(self.views) - 1, "componentType": COMPONENT_TYPES[kind], "count": len(array)}
-        limits = {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()} if bounds else {}
-        self.accessors.append({**facts, "type": shape, **limits})
-        self.data += array.tobytes()
-        return len(self.accessors) - 1
+def _padded(data: bytes, filler: bytes) -> bytes:
+    """Up to a multiple of four bytes."""
+    return data + filler * (-len(data) % 4)
 
-    def file(self, tree: dict[str, Any]) -> bytes:
-        """A binary file of what a tree says beside the arrays."""
-        tree |= {"accessors": self.accessors, "bufferViews": self.views, "buffers": [{"byteLength": len(self.data)}]}
-        tree |= {"asset": {"version": "2.0", "generator": "glsk-o3d"}}
-        text = json.dumps(tree, separators=(",", ":"), allow_nan=False).encode()
-        text += b" " * (-len(text) % 4)
-        body = bytes(self.data) + bytes(-len(self.data) % 4)
-        chunks = b"".join(
-            len(chunk).to_bytes(4, "little") + kind.to_bytes(4, "little") + chunk
-            for kind, chunk in ((JSON_CHUNK, text), (BINARY_CHUNK, body))
-        )
-        return b"".join(n.to_bytes(4, "little") for n in (MAGIC, 2, 12 + len(chunks))) + chunks
+
+def _words(*numbers: int) -> bytes:
+    return np.array(numbers, "<u4").tobytes()

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 from ...data.skeleton import Skeleton
 from ...interop.atomic import write_atomically
 from ..paths import check_promised, numbers, text_lines
-from ..scan import COLOR_CHANNELS, NO_TRIANGLES, NORMAL_NAMES, Scan, scan_of
+from ..scan import COLOR_CHANNELS, NO_TRIANGLES, NORMAL_NAMES, Scan, color_bytes, scan_of
 from .graphs import NoEdges, graph_skeleton
 
 SECTION = ("half_width", "half_thickness")
@@ -311,7 +311,7 @@ def columns_of(held: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
     for name, given in held.items():
         values = np.asarray(given)
         if name == "colors" and values.dtype.kind == "f":
-            values = np.round(255 * np.clip(values, 0, 1)).astype(np.uint8)
+            values = color_bytes(values)
         elif values.dtype.str[1:] not in WRITTEN_KINDS:
             values = values.astype(np.int32 if np.can_cast(values.dtype, np.int32) else float)
         columns |= dict(zip(_PROPERTIES.get(name, [name]), values.reshape(len(values), -1).T, strict=True))
