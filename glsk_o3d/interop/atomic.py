@@ -46,14 +46,14 @@ def write_atomically(path: str | os.PathLike[str], write: Callable[[Path], objec
     which names the path, where it cannot be written.
     """
     check_place(path)
-    given, path = path, Path(os.path.realpath(path))
-    temporary = path.with_name(f".{uuid.uuid4().hex}{path.suffix}")
+    target = Path(os.path.realpath(path))
+    temporary = target.with_name(f".{uuid.uuid4().hex}{target.suffix}")
     try:
-        with writing(given):
+        with writing(path):
             write(temporary)
-            if path.exists():
-                shutil.copymode(path, temporary)
-            os.replace(temporary, path)
+            if target.exists():
+                shutil.copymode(target, temporary)
+            os.replace(temporary, target)
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -67,11 +67,11 @@ def remove_unfinished(folder: Path) -> None:
 
 def check_place(path: str | os.PathLike[str]) -> None:
     """FileNotFoundError if the folder of a file does not exist, OSError if the path is a folder or a device."""
-    given, real = Path(path), Path(os.path.realpath(path))
-    if not real.parent.is_dir():
-        raise FileNotFoundError(f"{given.parent}: no such folder: make it before writing {given.name}")
-    if real.exists() and not real.is_file():
-        raise OSError(f"{given}: is a folder or a device, not a file to write to")
+    path, target = Path(path), Path(os.path.realpath(path))
+    if not target.parent.is_dir():
+        raise FileNotFoundError(f"{path.parent}: no such folder: make it before writing {path.name}")
+    if target.exists() and not target.is_file():
+        raise OSError(f"{path}: is a folder or a device, not a file to write to")
 
 
 @contextmanager

@@ -41,7 +41,7 @@ def shades(skeleton: Skeleton, color: ColorChoice, branch: np.ndarray, vertices:
     return ramp(np.where((vertices >= 0).all(axis=1), values[vertices].mean(axis=1), np.nan))
 
 
-def ramp(shown: np.ndarray) -> np.ndarray:
+def ramp(values: np.ndarray) -> np.ndarray:
     """Colours of numbers from 0 to 1; what is beyond has that of the end, NaN is grey."""
     viridis = require("matplotlib").colormaps["viridis"]
-    return np.where(np.isnan(shown)[:, None], UNKNOWN_GREY, viridis(np.nan_to_num(shown))[:, :3])
+    return np.where(np.isnan(values)[:, None], UNKNOWN_GREY, viridis(np.nan_to_num(values))[:, :3])

@@ -42,8 +42,8 @@ def to_line_set(skeleton: Skeleton, color: ColorChoice = "branch") -> Any:
     """
     check_skeleton(skeleton)
     lines = skeleton.to_line_set()
-    shown = shades(skeleton, color, branch_of_edge(skeleton), skeleton.edges)
-    lines.colors = import_open3d().utility.Vector3dVector(np.ascontiguousarray(shown).reshape(-1, 3))
+    colors = shades(skeleton, color, branch_of_edge(skeleton), skeleton.edges)
+    lines.colors = import_open3d().utility.Vector3dVector(np.ascontiguousarray(colors).reshape(-1, 3))
     return lines
 
 
@@ -152,9 +152,9 @@ def _frames(centre: np.ndarray, first: np.ndarray) -> tuple[np.ndarray, np.ndarr
     tangent = np.where(length > 1e-9, tangent / np.maximum(length, TINY), [0.0, 0.0, 1.0])
     axes = plane_axes(tangent)
     # the smallest rotation from one tangent to the next takes the one's first axis along
-    here, there, carried = tangent[:-1], tangent[1:], axes[:-1, :, 0]
-    dot = np.maximum(1 + (here * there).sum(axis=1), 1e-9)
-    carried = carried - ((carried * there).sum(axis=1) / dot)[:, None] * (here + there)
+    before, after, carried = tangent[:-1], tangent[1:], axes[:-1, :, 0]
+    dot = np.maximum(1 + (before * after).sum(axis=1), 1e-9)
+    carried = carried - ((carried * after).sum(axis=1) / dot)[:, None] * (before + after)
     u, v = np.einsum("ni,nij->jn", carried, axes[1:])
     turn = np.r_[0, np.where(first[1:], 0, np.arctan2(v, u))].cumsum()
     return tangent, turn

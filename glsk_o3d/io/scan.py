@@ -29,10 +29,6 @@ _SIGNS: dict[str, Callable[[Any, Any], Any]] = {
 _COMPARISON = r"(\w+)\s*(?:([=!<>]=|[<>])\s*(.+)|\bin\b\s*[([](.*)[)\]])"
 
 
-class NoPoints(Exception):
-    """A file is not damaged, but holds no points; why not."""
-
-
 @dataclass(frozen=True, eq=False)
 class Scan:
     """Points, (N, 3) arrays, and what a file says of each."""
@@ -53,8 +49,8 @@ class Scan:
         if len(self.triangles) and rows.dtype == bool:
             triangles = (np.cumsum(rows) - 1)[self.triangles[rows[self.triangles].all(axis=1)]]
         attributes = {name: values[rows] for name, values in self.attributes.items()}
-        known = {name: values[rows] for name in PER_POINT if (values := getattr(self, name)) is not None}
-        return replace(self, **known, attributes=attributes, triangles=triangles)
+        fields = {name: values[rows] for name in PER_POINT if (values := getattr(self, name)) is not None}
+        return replace(self, **fields, attributes=attributes, triangles=triangles)
 
     def by_area(self, sample: Any = "auto") -> Scan:
         """The points that stand for a mesh, see `Sampler.sample`, with normals, and all else as a corner has it."""
@@ -70,10 +66,10 @@ class Scan:
         columns = {**dict(zip("xyz", self.positions.T, strict=True)), **self.attributes}
         chosen = np.ones(len(self), bool)
         for name, compare, value in parsed(where):
-            known = f"{name}_" if iskeyword(name) else name
-            if known not in columns:
+            column = f"{name}_" if iskeyword(name) else name
+            if column not in columns:
                 raise InvalidParameterError(did_you_mean(name, columns, "attribute of the points"))
-            chosen &= compare(columns[known], value)
+            chosen &= compare(columns[column], value)
         return chosen
 
     @classmethod

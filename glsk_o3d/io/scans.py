@@ -1,18 +1,16 @@
 """Scans from files, clouds and meshes, whole or in blocks."""
 
-import errno
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
-from ..errors import FileFormatError, InvalidCloudError, MissingPackageError, brief
+from ..errors import FileFormatError, InvalidCloudError
 from ..interop.atomic import existing_file
 from ..interop.packages import import_open3d
 from .formats import lines, pcd, ply, scanners, text_tables
-from .paths import MESH_ENDINGS, SCAN_ENDINGS, TEXT_ENDINGS, unknown_ending
-from .scan import ALL_ROWS, NoPoints, Scan, parsed
+from .paths import MESH_ENDINGS, SCAN_ENDINGS, TEXT_ENDINGS, refused_if_damaged, unknown_ending
+from .scan import ALL_ROWS, Scan, parsed
 from .skeletons import holds_skeleton
 
 BLOCK_ROWS = 1_000_000  # measured: larger blocks are not read faster, and take more memory
@@ -167,32 +165,15 @@ def _scan_file(path: str | os.PathLike[str]) -> Path:
 
 
 def _opened(path: Path, rows: int, bare: bool) -> tuple[int | None, Iterator[Scan]]:
-    with _refused_where_damaged(path):
+    with refused_if_damaged(path, "file"):
         return _SCAN_READERS[path.suffix.lower()](path, rows, bare)
-
-
-@contextmanager
-def _refused_where_damaged(path: Path) -> Iterator[None]:
-    """FileFormatError for what goes wrong with the contents of a file."""
-    try:
-        yield
-    except (MissingPackageError, PermissionError):
-        raise
-    except OSError as error:
-        if error.errno in (None, errno.EINVAL):  # of a parser, on a hostile file
-            raise FileFormatError(f"{path}: not a valid {path.suffix.lower()} file: {brief(error)}") from error
-        raise OSError(error.errno, os.strerror(error.errno), error.filename or os.fspath(path)) from error
-    except NoPoints as error:
-        raise FileFormatError(f"{path}: no points could be read: {error}") from None
-    except Exception as error:  # whatever a parser raises on a hostile file, std::bad_alloc
-        raise FileFormatError(f"{path}: not a valid {path.suffix.lower()} file: {brief(error)}") from error
 
 
 def _chosen(path: Path, blocks: Iterator[Scan], where: str | None) -> Iterator[Scan]:
     """Of each block the points for which a condition holds, if there are any; errors as those of files."""
     read = chosen = 0
     while True:
-        with _refused_where_damaged(path):
+        with refused_if_damaged(path, "file"):
             block = next(blocks, None)
         if block is None:
             break

@@ -9,11 +9,11 @@ from typing import NamedTuple
 from ..analysis.comparison import Truth
 from ..curve.rooted import RootPlace
 from ..data.skeleton import Skeleton
-from ..errors import FileFormatError, brief
+from ..errors import FileFormatError
 from ..interop.atomic import existing_file, write_atomically
 from .formats import fields, gltf, lines, ply, trees
 from .formats.graphs import NoEdges, as_forest, holding_all
-from .paths import SCAN_ENDINGS, unknown_ending
+from .paths import SCAN_ENDINGS, refused_if_damaged, unknown_ending
 
 
 class Format(NamedTuple):
@@ -135,12 +135,11 @@ def read_skeleton(path: str | os.PathLike[str]) -> Skeleton:
     if read is None:
         raise FileFormatError(f"{path}: {ending} is only written; read are {', '.join(READABLE)}")
     data = path.read_bytes()
-    try:
-        return read(data)
-    except NoEdges:
-        raise _is_cloud(path) from None
-    except Exception as error:  # whatever a parser raises on a hostile file
-        raise FileFormatError(f"{path}: not a valid {ending} skeleton: {brief(error)}") from error
+    with refused_if_damaged(path, "skeleton"):
+        try:
+            return read(data)
+        except NoEdges:
+            raise _is_cloud(path) from None
 
 
 def _is_cloud(path: Path) -> FileFormatError:

@@ -53,11 +53,11 @@ def npz_arrays(data: bytes, names: Iterable[str]) -> dict[str, Any]:
     with np.load(io.BytesIO(data), allow_pickle=False) as archive:
         check_budget(sum(info.file_size for info in archive.zip.infolist()), len(data))
         for name in {*names} & {*archive}:
-            with archive.zip.open(f"{name}.npy") as held:
-                first = np.lib.format.read_magic(held) == (1, 0)  # later ones may have longer headers
-                read = np.lib.format.read_array_header_1_0 if first else np.lib.format.read_array_header_2_0
-                shape, _, kind = read(held)
-                check_promised(math.prod(shape) * kind.itemsize, archive.zip.getinfo(f"{name}.npy").file_size, name)
+            with archive.zip.open(f"{name}.npy") as stream:
+                oldest = np.lib.format.read_magic(stream) == (1, 0)  # later ones may have longer headers
+                read = np.lib.format.read_array_header_1_0 if oldest else np.lib.format.read_array_header_2_0
+                shape, _, kind = read(stream)
+            check_promised(math.prod(shape) * kind.itemsize, archive.zip.getinfo(f"{name}.npy").file_size, name)
             arrays[name] = archive[name]
     return arrays
 
@@ -94,19 +94,14 @@ def _decode(values: Any) -> Skeleton:
 
 def _plain(value: Any) -> Any:
     """What JSON can hold: NaN becomes null and the infinities strings, in arrays, dicts and lists alike."""
+    if isinstance(value, (np.ndarray, np.generic)):
+        value = value.tolist()
     if isinstance(value, dict):
         return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        cells = value.astype(object)
-        if value.dtype.kind == "f":
-            cells[np.isnan(value)] = None
-            cells[np.isposinf(value)], cells[np.isneginf(value)] = "Infinity", "-Infinity"
-        return cells.tolist()
-    value = value.item() if isinstance(value, np.generic) else value
     if isinstance(value, (list, tuple)):
         return [_plain(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
-        return None if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
+        return {math.inf: "Infinity", -math.inf: "-Infinity"}.get(value)
     return value
 
 

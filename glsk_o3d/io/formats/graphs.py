@@ -21,14 +21,14 @@ class NoEdges(Exception):
 
 
 def graph_skeleton(
-    vertices: ArrayLike, edges: ArrayLike, radii: ArrayLike | None = None, **known: ArrayLike
+    vertices: ArrayLike, edges: ArrayLike, radii: ArrayLike | None = None, **others: ArrayLike
 ) -> Skeleton:
     """A skeleton without a cloud, of edges in any order: they are sorted, and repeated ones and those from a vertex to
-    itself are dropped. `known` are other fields of the vertices.
+    itself are dropped. `others` are other fields of the vertices.
     """
     vertices = np.asarray(vertices, float).reshape(-1, 3)
     edges, none = simple_edges(np.asarray(edges, np.int64).reshape(-1, 2)), np.empty(0)
-    return Skeleton(vertices, edges, radii, vertex_of_point=none, points=none, normals=none, **known)  # type: ignore[arg-type]
+    return Skeleton(vertices, edges, radii, vertex_of_point=none, points=none, normals=none, **others)  # type: ignore[arg-type]
 
 
 def as_forest(skeleton: Skeleton, cut: bool, root: RootPlace | None) -> Skeleton:
@@ -79,8 +79,8 @@ def global_shift(skeleton: Skeleton) -> np.ndarray:
     sizes = sizes[sizes > 0]
     if len(sizes) == 0:
         return np.zeros(3)
-    lost = np.abs(vertices).max(axis=0) * np.finfo(np.float32).eps > FLOAT32_SHARE * np.median(sizes)
-    return np.where(lost, np.floor(vertices.min(axis=0)), 0.0)
+    inexact = np.abs(vertices).max(axis=0) * np.finfo(np.float32).eps > FLOAT32_SHARE * np.median(sizes)
+    return np.where(inexact, np.floor(vertices.min(axis=0)), 0.0)
 
 
 def line(*words: object) -> str:

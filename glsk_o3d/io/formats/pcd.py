@@ -7,7 +7,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from ..paths import check_promised, numbers, text_lines
+from ..paths import binary_rows, check_promised, numbers, text_lines
 from ..scan import Scan, scan_of
 
 _NORMALS = {f"normal_{axis}": f"n{axis}" for axis in "xyz"}
@@ -19,19 +19,19 @@ _PACKED_COLORS, _SHIFTS = ("rgb", "rgba"), {"red": 16, "green": 8, "blue": 0}
 def blocks(path: Path, rows: int, bare: bool) -> tuple[int | None, Iterator[Scan]]:
     """Compressed data, whose columns follow each other, are read whole."""
     with path.open("rb") as stream:
-        row, points, kept = read_header(stream)
+        row, points, form = read_header(stream)
         start = stream.tell()
-    if kept == "binary_compressed":
+    if form == "binary_compressed":
         return None, map(_compressed, [path])
-    if kept not in ("ascii", "binary"):
-        raise ValueError(f"its data are {kept!r}, which is unknown")
-    least = row.itemsize if kept == "binary" else 2 * sum(row[name].shape[0] for name in row.names or ())
-    check_promised(points, (path.stat().st_size - start + (kept == "ascii")) // least)  # text may lack its last end
-    return points, _blocks(path, start, row, points, kept == "binary", rows, bare)
+    if form not in ("ascii", "binary"):
+        raise ValueError(f"its data are {form!r}, which is unknown")
+    least = row.itemsize if form == "binary" else 2 * sum(row[name].shape[0] for name in row.names or ())
+    check_promised(points, (path.stat().st_size - start + (form == "ascii")) // least)  # text may lack its last end
+    return points, _blocks(path, start, row, points, form == "binary", rows, bare)
 
 
 def read_header(stream: BinaryIO) -> tuple[np.dtype, int, str]:
-    """The type of a row, the number of points, and how the data are kept, which the stream gives next."""
+    """The type of a row, the number of points, and the form of the data, which the stream gives next."""
     header: dict[str, list[str]] = {}
     while "DATA" not in header:
         line = stream.readline(1 << 16)
@@ -41,38 +41,38 @@ def read_header(stream: BinaryIO) -> tuple[np.dtype, int, str]:
         header[key] = values
     names, sizes, kinds = header["FIELDS"], header["SIZE"], header["TYPE"]
     counts = [int(count) for count in header.get("COUNT", ["1"] * len(names))]
-    points, (kept,) = int(header["POINTS"][0]), header["DATA"]
+    points, (form,) = int(header["POINTS"][0]), header["DATA"]
     if points < 0 or min(counts, default=0) < 1:
         raise ValueError("its header has a negative count")
     if not all(kind + size in _TYPES for kind, size in zip(kinds, sizes, strict=True)):
         raise ValueError("its header has unknown types")
     fields = zip(names, sizes, kinds, counts, strict=True)
     row = np.dtype([(f"{i} {name}", f"<{kind.lower()}{size}", (n,)) for i, (name, size, kind, n) in enumerate(fields)])
-    return row, points, kept
+    return row, points, form
 
 
 def _blocks(path: Path, start: int, row: np.dtype, points: int, binary: bool, rows: int, bare: bool) -> Iterator[Scan]:
+    for table in (binary_rows if binary else _text_rows)(path, start, row, points, rows):
+        yield _scan({name: table[name] for name in row.names or () if not bare or name[-2:] in _PLACE})
+
+
+@np.errstate(invalid="ignore")
+def _text_rows(path: Path, start: int, row: np.dtype, points: int, rows: int) -> Iterator[np.ndarray]:
+    """The same of text, as `binary_rows`."""
+    names = row.names or ()
+    ends = np.cumsum([row[name].shape[0] for name in names])
     with path.open("rb") as stream:
         stream.seek(start)
         lines = text_lines(stream)
         for begin in range(0, points, rows):
             n = min(rows, points - begin)
-            table = np.frombuffer(stream.read(n * row.itemsize), row) if binary else _text(lines, row, n)
-            if len(table) < n:
-                check_promised(points, begin + len(table))
-            yield _scan({name: table[name] for name in row.names or () if not bare or name[-2:] in _PLACE})
-
-
-@np.errstate(invalid="ignore")
-def _text(lines: Iterator[bytes], row: np.dtype, n: int) -> np.ndarray:
-    """The next n rows, or as many as remain."""
-    names = row.names or ()
-    ends = np.cumsum([row[name].shape[0] for name in names])
-    values = numbers(islice(lines, n)).reshape(-1, ends[-1])
-    table = np.empty(len(values), row)
-    for name, columns in zip(names, np.split(values, ends[:-1], axis=1), strict=True):
-        table[name] = columns
-    return table
+            values = numbers(islice(lines, n)).reshape(-1, ends[-1])
+            if len(values) < n:
+                check_promised(points, begin + len(values))
+            table = np.empty(len(values), row)
+            for name, columns in zip(names, np.split(values, ends[:-1], axis=1), strict=True):
+                table[name] = columns
+            yield table
 
 
 def _compressed(path: Path) -> Scan:
@@ -113,13 +113,13 @@ def _unpacked(data: bytes, size: int) -> bytes:
     return bytes(out)
 
 
-def _scan(columns: dict[str, np.ndarray]) -> Scan:
-    known = {name.partition(" ")[2]: values[:, 0] for name, values in columns.items() if values.shape[1] == 1}
-    known.pop("_", None)  # padding
-    if _NORMALS.keys() <= known.keys():
-        known |= {name: known.pop(of_pcl) for of_pcl, name in _NORMALS.items()}
-    packed = next((known.pop(name) for name in _PACKED_COLORS if name in known), None)
+def _scan(fields: dict[str, np.ndarray]) -> Scan:
+    columns = {name.partition(" ")[2]: values[:, 0] for name, values in fields.items() if values.shape[1] == 1}
+    columns.pop("_", None)  # padding
+    if _NORMALS.keys() <= columns.keys():
+        columns |= {name: columns.pop(of_pcl) for of_pcl, name in _NORMALS.items()}
+    packed = next((columns.pop(name) for name in _PACKED_COLORS if name in columns), None)
     if packed is not None:  # in the bits of a number of four bytes
         bits = np.ascontiguousarray(packed, packed.dtype if packed.dtype.itemsize == 4 else np.uint32).view(np.uint32)
-        known |= {name: (bits >> shift & 255).astype(np.uint8) for name, shift in _SHIFTS.items()}
-    return scan_of(known, 255)
+        columns |= {name: (bits >> shift & 255).astype(np.uint8) for name, shift in _SHIFTS.items()}
+    return scan_of(columns, 255)

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from ...data.skeleton import Skeleton
 from ...interop.atomic import write_atomically
-from ..paths import check_promised, numbers, text_lines
+from ..paths import binary_rows, check_promised, numbers, text_lines
 from ..scan import COLOR_CHANNELS, NO_TRIANGLES, NORMAL_NAMES, Scan, color_bytes, scan_of
 from .graphs import NoEdges, graph_skeleton
 
@@ -231,8 +231,8 @@ def read(data: bytes) -> Skeleton:
     vertex, edge = tables["vertex"], tables["edge"]
     xyz = np.column_stack([vertex[axis] for axis in "xyz"]).astype(float)
     radii = np.array(vertex["radius"], float) if "radius" in vertex else None
-    known = {name: vertex[name] for name in SECTION if set(SECTION) <= vertex.keys()}
-    return graph_skeleton(xyz, np.column_stack([edge["vertex1"], edge["vertex2"]]), radii, **known)
+    section = {name: vertex[name] for name in SECTION if set(SECTION) <= vertex.keys()}
+    return graph_skeleton(xyz, np.column_stack([edge["vertex1"], edge["vertex2"]]), radii, **section)
 
 
 # --------------------------------------------------------------------------------------------------------------- scans
@@ -263,11 +263,8 @@ def _whole(path: Path) -> Scan:
 
 
 def _blocks(path: Path, start: int, row: np.dtype, n: int, rows: int, bare: bool) -> Iterator[Scan]:
-    with path.open("rb") as stream:
-        stream.seek(start)
-        for begin in range(0, n, rows):
-            table = np.frombuffer(stream.read(min(rows, n - begin) * row.itemsize), row)
-            yield _scan({name: table[name] for name in row.names or () if not bare or name in "xyz"})
+    for table in binary_rows(path, start, row, n, rows):
+        yield _scan({name: table[name] for name in row.names or () if not bare or name in "xyz"})
 
 
 def _scan(table: Table) -> Scan:
@@ -288,15 +285,15 @@ def triangles(faces: Table, n: int) -> np.ndarray:
     fans = np.maximum(counts - 2, 0)
     first = np.repeat(np.cumsum(counts) - counts, fans)
     step = np.arange(len(first)) - np.repeat(np.cumsum(fans) - fans, fans)
-    return np.column_stack([corners.values[first + each] for each in (0, step + 1, step + 2)]).astype(np.int64)
+    return np.column_stack([corners.values[first + corner] for corner in (0, step + 1, step + 2)]).astype(np.int64)
 
 
 # ------------------------------------------------------------------------------------------------------------- writing
 
 
-def save(path: Path, held: Mapping[str, ArrayLike], triangles: ArrayLike | None = None) -> None:
+def save(path: Path, arrays: Mapping[str, ArrayLike], triangles: ArrayLike | None = None) -> None:
     """Write points with what `columns_of` takes, and triangles (T, 3) between them, as `write_atomically` does."""
-    vertices, corners, more = rows_of(columns_of(held)), np.asarray(() if triangles is None else triangles), ""
+    vertices, corners, more = rows_of(columns_of(arrays)), np.asarray(() if triangles is None else triangles), ""
     faces = np.empty(len(corners), [("n", "u1"), ("corners", "<i4", 3)])
     if triangles is not None:
         faces["n"], faces["corners"] = 3, corners
@@ -305,11 +302,11 @@ def save(path: Path, held: Mapping[str, ArrayLike], triangles: ArrayLike | None 
     write_atomically(path, lambda temporary: temporary.write_bytes(data))
 
 
-def columns_of(held: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
+def columns_of(arrays: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
     """Columns of the types that Open3D reads, of arrays, (n,) or (n, 3), by the names that its clouds have."""
     columns: dict[str, np.ndarray] = {}
-    for name, given in held.items():
-        values = np.asarray(given)
+    for name, array_like in arrays.items():
+        values = np.asarray(array_like)
         if name == "colors" and values.dtype.kind == "f":
             values = color_bytes(values)
         elif values.dtype.str[1:] not in WRITTEN_KINDS:

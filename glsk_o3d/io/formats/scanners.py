@@ -11,8 +11,8 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ...interop.packages import require, require_for
-from ..paths import check_budget, check_promised
-from ..scan import COLOR_CHANNELS, NoPoints, Scan, brightest, scan_of
+from ..paths import NoPoints, check_budget, check_promised
+from ..scan import COLOR_CHANNELS, Scan, brightest, scan_of
 
 VLR_BYTES = 54  # published: LAS 1.4 R15, of the head of a record
 LAYERED = 3  # published: LASzip's way to pack in which chunks have layers
@@ -122,8 +122,8 @@ def _e57_scan(file: Any, header: Any) -> dict[str, np.ndarray]:
     names = [name for name in ("intensity", *_E57_COLORS, _E57_INVALID) if name in header.point_fields]
     data, buffers = file.make_buffers([*_E57_PLACE, *names], header.point_count)
     check_promised(header.point_count, header.points.reader(buffers).read())
-    if (wrong := data.pop(_E57_INVALID, None)) is not None:
-        data = {name: values[wrong == 0] for name, values in data.items()}
+    if (invalid := data.pop(_E57_INVALID, None)) is not None:
+        data = {name: values[invalid == 0] for name, values in data.items()}
     xyz = np.column_stack([data.pop(name) for name in _E57_PLACE])
     if header.has_pose():
         xyz = file.to_global(xyz, header.rotation, header.translation)

@@ -16,7 +16,8 @@ from typing import Any, NamedTuple, TextIO
 import numpy as np
 
 from ...geometry.groups import quantile
-from ..scan import NoPoints, Scan, scan_of
+from ..paths import NoPoints
+from ..scan import Scan, scan_of
 
 _log = logging.getLogger(__name__)
 
@@ -62,7 +63,9 @@ def read(path: Path) -> Scan:
     names = layout.names or [*"xyz", *(f"column_{column + 1}" for column in layout.columns[3:])]
     columns: dict[str, np.ndarray] = {}
     for name, values in zip(names, rows.T, strict=True):
-        role = name if _role(name) in columns else _role(name)
+        role = _role(name)
+        if role in columns:
+            role = name
         while role in columns:
             role += "_2"
         columns[role] = values if role in _ROLES.values() else _whole(values)
@@ -77,11 +80,10 @@ def _layout(stream: TextIO) -> Layout:
         comment = next((mark for mark in _COMMENTS if line.lstrip().startswith(mark)), "")
         line = line.strip().removeprefix(comment)
         delimiter = ";" if ";" in line else "," if "," in line else None
-        words, columns = _parted(line, delimiter)
-        if delimiter == "," and len(columns) < 3 and len(_parted(line, None)[1]) >= 3:
+        if delimiter == "," and len(_numeric(_split(line, ","))) < 3 <= len(_numeric(_split(line, None))):
             delimiter = None  # its commas are decimal points
-            words, columns = _parted(line, None)
-        columns = [] if comment else columns
+        words = _split(line, delimiter)
+        columns = [] if comment else _numeric(words)
         if len(columns) > MOST_COLUMNS:
             raise ValueError(f"a line has {len(columns)} numbers, and at most {MOST_COLUMNS} are read")
         if len(columns) >= 3:
@@ -106,22 +108,22 @@ def _rows(stream: TextIO, layout: Layout, path: Path) -> np.ndarray:
     with suppress(ValueError):  # some line is not like the others
         return np.loadtxt(stream, skiprows=layout.skip, **form)
     stream.seek(0)
-    found, lost, last = array("d"), 0, layout.columns[-1]
+    cells, skipped = array("d"), 0
     for line in islice(stream, layout.skip, None):
-        words = line.partition("#")[0].split(layout.delimiter)
+        words = _cells(line.partition("#")[0], layout.delimiter)
         if not any(map(str.strip, words)):
             continue
-        row = [_number(words[i], layout.delimiter) if i < len(words) else None for i in layout.columns]
-        cut = not line.endswith("\n") and len(words) <= last  # its last number may have been longer
+        row = [_number(words[i]) if i < len(words) else None for i in layout.columns]
+        cut = not line.endswith("\n") and len(words) <= layout.columns[-1]  # its last number may have been longer
         if cut or None in row[:3]:
-            lost += 1
+            skipped += 1
         else:
-            found.extend(math.nan if number is None else number for number in row)
-    rows = np.array(found).reshape(-1, len(layout.columns))
-    if lost > len(rows):
-        raise NoPoints(f"{lost} of {lost + len(rows)} lines hold no point; commas {AMBIGUOUS}")
-    if lost:
-        _log.warning("%s: %d of %d lines hold no point and were skipped", path, lost, lost + len(rows))
+            cells.extend(math.nan if number is None else number for number in row)
+    rows = np.array(cells).reshape(-1, len(layout.columns))
+    if skipped > len(rows):
+        raise NoPoints(f"{skipped} of {skipped + len(rows)} lines hold no point; commas {AMBIGUOUS}")
+    if skipped:
+        _log.warning("%s: %d of %d lines hold no point and were skipped", path, skipped, skipped + len(rows))
     return rows
 
 
@@ -138,15 +140,24 @@ def _whole(values: np.ndarray) -> np.ndarray:
     return values.astype(np.int32) if whole else values
 
 
-def _parted(line: str, delimiter: str | None) -> tuple[list[str], list[int]]:
-    """The words of a line, and which of them are numbers."""
-    words = [word.strip().strip("\"'") for word in line.split(delimiter)]
-    return words, [i for i, word in enumerate(words) if _number(word, delimiter) is not None]
+def _cells(line: str, delimiter: str | None) -> list[str]:
+    """What is between delimiters; commas that are none are decimal points."""
+    return (line if delimiter == "," else line.replace(",", ".")).split(delimiter)
+
+
+def _split(line: str, delimiter: str | None) -> list[str]:
+    """The words of a line, without quotes."""
+    return [cell.strip().strip("\"'") for cell in _cells(line, delimiter)]
+
+
+def _numeric(words: list[str]) -> list[int]:
+    """Which words are numbers."""
+    return [i for i, word in enumerate(words) if _number(word) is not None]
 
 
 def _has_decimal_commas(names: list[str], lines: list[str]) -> bool:
     """Whether commas that part words are decimal points, too: more words than names, or zeros ahead of a number."""
-    rows = [_parted(line.strip().rstrip(","), ",")[0] for line in lines if "." not in line]
+    rows = [_split(line.strip().rstrip(","), ",") for line in lines if "." not in line]
     if names:
         sizes = [len(words) - len(names) for words in rows] if len(rows) == len(lines) else [0]
         more = quantile(np.array(sizes))  # a whole place among them has no commas
@@ -155,8 +166,8 @@ def _has_decimal_commas(names: list[str], lines: list[str]) -> bool:
     return any(x[1] or x[3] for x in padded) and not any(x[0] or x[2] for x in padded)
 
 
-def _number(word: str, delimiter: str | None) -> float | None:
+def _number(word: str) -> float | None:
     try:
-        return None if "_" in word else float(word if delimiter == "," else word.replace(",", "."))
+        return None if "_" in word else float(word)
     except ValueError:
         return None
