@@ -28,20 +28,20 @@ def skeleton(cloud):
     return glsk.skeletonize(cloud)
 
 
-def held(cloud):
+def attributes(cloud):
     return {name: cloud.point[name].numpy() for name in cloud.point}
 
 
-def assert_equal(found, expected):
-    assert found.keys() == expected.keys()
+def assert_equal(actual, expected):
+    assert actual.keys() == expected.keys()
     for name, values in expected.items():
-        assert found[name].dtype == values.dtype, name
-        np.testing.assert_array_equal(found[name], values, err_msg=name)
+        assert actual[name].dtype == values.dtype, name
+        np.testing.assert_array_equal(actual[name], values, err_msg=name)
 
 
 def test_tensor_clouds_keep_what_they_have_and_gain_ours(cloud, skeleton):
-    before, vertex, branch = held(cloud), skeleton.vertex_of_point, segment(skeleton)
-    annotated = held(annotate(skeleton, cloud))
+    before, vertex, branch = attributes(cloud), skeleton.vertex_of_point, segment(skeleton)
+    annotated = attributes(annotate(skeleton, cloud))
     kind = cloud.point.positions.numpy().dtype
     gained = {
         "skeleton_vertex": vertex.astype(np.int32),
@@ -51,7 +51,7 @@ def test_tensor_clouds_keep_what_they_have_and_gain_ours(cloud, skeleton):
         "confidence": skeleton.confidence[vertex].astype(kind),
     }
     assert_equal(annotated, before | {name: values[:, None] for name, values in gained.items()})
-    assert_equal(held(cloud), before)
+    assert_equal(attributes(cloud), before)
     assert not np.shares_memory(annotated["positions"], before["positions"])
 
 
@@ -68,8 +68,8 @@ def test_legacy_clouds_arrays_and_meshes_become_tensor_ones(skeleton):
     for array, dtype in ((POINTS, np.float64), (POINTS.astype(np.float32), np.float32), (POINTS.tolist(), np.float64)):
         assert annotate(skeleton, array).point.positions.numpy().dtype == dtype
     mesh = o3d.geometry.TriangleMesh(vectors(POINTS), o3d.utility.Vector3iVector([[0, 1, 2]]))
-    for given in (mesh, o3d.t.geometry.TriangleMesh.from_legacy(mesh)):
-        marked = annotate(skeleton, given)
+    for cloud in (mesh, o3d.t.geometry.TriangleMesh.from_legacy(mesh)):
+        marked = annotate(skeleton, cloud)
         assert isinstance(marked, o3d.t.geometry.TriangleMesh)
         assert len(marked.triangle.indices) == 1
         np.testing.assert_array_equal(marked.vertex.skeleton_vertex.numpy()[:, 0], skeleton.vertex_of_point)
@@ -89,12 +89,6 @@ def test_whole_numbers_and_points_that_are_not_finite():
     np.testing.assert_array_equal(annotated.point.colors.numpy()[7], [153] * 3)
 
 
-def test_colours(cloud, skeleton):
-    shown = annotate(skeleton, cloud, color="branch").point.colors.numpy()
-    assert shown.dtype == np.uint8
-    assert len(np.unique(np.column_stack([shown, segment(skeleton)]), axis=0)) == len(np.unique(shown, axis=0)) == 3
-
-
 @pytest.mark.parametrize("color", ["branch", "radius", (0.2, 0.4, 1.0)])
 @pytest.mark.parametrize("kind", [o3d.core.float32, o3d.core.float64])
 def test_colours_of_meshes_are_those_of_clouds_in_files_too(skeleton, tmp_path, kind, color):
@@ -102,8 +96,10 @@ def test_colours_of_meshes_are_those_of_clouds_in_files_too(skeleton, tmp_path, 
     mesh = o3d.geometry.TriangleMesh(vectors(POINTS), o3d.utility.Vector3iVector([[0, 1, 2]]))
     mesh.vertex_colors = vectors(COLORS / 255)  # which are replaced
     shown = annotate(skeleton, POINTS, color=color).point.colors.numpy()
-    for given in (mesh, o3d.t.geometry.TriangleMesh.from_legacy(mesh, kind)):
-        marked = annotate(skeleton, given, color=color)
+    assert shown.dtype == np.uint8
+    assert color != "branch" or len(np.unique(np.column_stack([shown, segment(skeleton)]), axis=0)) == 3
+    for cloud in (mesh, o3d.t.geometry.TriangleMesh.from_legacy(mesh, kind)):
+        marked = annotate(skeleton, cloud, color=color)
         np.testing.assert_allclose(marked.vertex.colors.numpy(), shown / 255, atol=1e-7)
         np.testing.assert_allclose(np.asarray(marked.to_legacy().vertex_colors), shown / 255, atol=1e-7)
         o3d.t.io.write_triangle_mesh(str(tmp_path / "m.ply"), marked)

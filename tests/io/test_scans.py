@@ -1,15 +1,15 @@
 """Scans from files: whole or in blocks they are the same, and of one that is damaged nothing is believed."""
 
-import json
 import os
-import struct
 
 import numpy as np
 import open3d as o3d
 import pytest
+import trimesh
 
 from glsk_o3d import save_skeleton
 from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError, SkeletonWarning
+from glsk_o3d.io.formats import ply as tables
 from glsk_o3d.io.formats.text_tables import holds_points
 from glsk_o3d.io.paths import CLOUD_ENDINGS, MESH_ENDINGS
 from glsk_o3d.io.scans import promised_points, read_blocks, read_cloud, read_mesh, read_scan, read_tensor_cloud
@@ -34,7 +34,7 @@ def test_meshes_give_their_vertices_or_a_sample(tmp_path, ending, resolution, co
     mesh, path = o3d.geometry.TriangleMesh.create_sphere(2.0, resolution), tmp_path / f"m.{ending}"
     mesh.compute_vertex_normals()
     o3d.io.write_triangle_mesh(str(path), mesh)
-    centres = (np.asarray(it.vertices)[np.asarray(it.triangles)].mean(axis=1) for it in (read_mesh(path), mesh))
+    centres = (np.asarray(each.vertices)[np.asarray(each.triangles)].mean(axis=1) for each in (read_mesh(path), mesh))
     np.testing.assert_allclose(*(np.sort(each, axis=0) for each in centres), atol=1e-3)
     assert len(read_scan(path)) >= len(mesh.vertices)
     assert (len(read_cloud(path).points) == 25000) == coarse
@@ -44,12 +44,7 @@ def test_a_sample_has_what_a_corner_has(tmp_path):
     mesh = o3d.geometry.TriangleMesh.create_box(1, 2, 3)
     path = tmp_path / "m.ply"
     corners = np.asarray(mesh.vertices)
-    with path.open("w") as stream:
-        stream.write("ply\nformat ascii 1.0\nelement vertex 8\n")
-        stream.write("".join(f"property double {name}\n" for name in "xyz") + "property int label\n")
-        stream.write("element face 12\nproperty list uchar int vertex_indices\nend_header\n")
-        stream.writelines(f"{x} {y} {z} {x == 0:d}\n" for x, y, z in corners)
-        stream.writelines(f"3 {a} {b} {c}\n" for a, b, c in np.asarray(mesh.triangles))
+    tables.save(path, {"positions": corners, "label": (corners[:, 0] == 0).astype(np.int32)}, mesh.triangles)
     cloud = read_tensor_cloud(path)
     places, normals = cloud.point.positions.numpy(), cloud.point.normals.numpy()
     side = np.argmax(np.abs(normals), axis=1)
@@ -64,35 +59,12 @@ def test_a_sample_has_what_a_corner_has(tmp_path):
     np.testing.assert_allclose(half.positions[half.triangles][..., 0], 1)
 
 
-def glb(nodes):
-    """A scene: one cube for every place and scale."""
-    mesh = o3d.geometry.TriangleMesh.create_box()
-    places = np.asarray(mesh.vertices, "<f4").tobytes()
-    corners = np.asarray(mesh.triangles, "<u2").tobytes()
-    scene = {
-        "asset": {"version": "2.0"},
-        "scene": 0,
-        "scenes": [{"nodes": list(range(len(nodes)))}],
-        "nodes": [{"mesh": 0, "translation": list(place), "scale": [size] * 3} for place, size in nodes],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
-        "buffers": [{"byteLength": len(places) + len(corners)}],
-        "bufferViews": [
-            {"buffer": 0, "byteLength": len(places)},
-            {"buffer": 0, "byteOffset": len(places), "byteLength": len(corners)},
-        ],
-        "accessors": [
-            {"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 1]},
-            {"bufferView": 1, "componentType": 5123, "count": 36, "type": "SCALAR"},
-        ],
-    }
-    text = json.dumps(scene).encode()
-    chunks = [(text.ljust(-len(text) % 4 + len(text)), b"JSON"), (places + corners, b"BIN\0")]
-    body = b"".join(struct.pack("<I", len(data)) + kind + data for data, kind in chunks)
-    return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
-
-
 def test_a_scene_of_several_nodes(tmp_path):
-    (tmp_path / "s.glb").write_bytes(glb([((0, 0, 0), 1), ((5, 0, 0), 2), ((0, -7, 0), 0.5)]))
+    scene = trimesh.Scene()
+    for place, size in (((0, 0, 0), 1), ((5, 0, 0), 2), ((0, -7, 0), 0.5)):
+        box = trimesh.creation.box(bounds=[[0, 0, 0], [1, 1, 1]])
+        scene.add_geometry(box, transform=trimesh.transformations.translation_matrix(place) @ np.diag([*[size] * 3, 1]))
+    scene.export(tmp_path / "s.glb")
     scan = read_scan(tmp_path / "s.glb")
     assert (len(scan), len(scan.triangles)) == (24, 36)
     np.testing.assert_allclose(scan.positions.min(axis=0), [0, -7, 0])
@@ -150,15 +122,12 @@ def test_what_is_no_file_or_may_never_end(tmp_path, read):
     with pytest.raises(FileFormatError, match=r"folder\.ply.* is a folder"):
         read(str(tmp_path / "folder.ply"))
     if hasattr(os, "mkfifo"):
-        path = tmp_path / "pipe.ply"
-        os.mkfifo(path)
-        assert not holds_points(path)
-        with pytest.raises(FileFormatError, match=r"pipe\.ply: is a pipe or a device"):
-            read(path)
-        path.unlink()
-        path.symlink_to("/dev/zero")
-        with pytest.raises(FileFormatError, match=r"pipe\.ply: is a pipe or a device"):
-            read(path)
+        os.mkfifo(tmp_path / "pipe.ply")
+        (tmp_path / "zero.ply").symlink_to("/dev/zero")
+        for name in ("pipe.ply", "zero.ply"):
+            assert not holds_points(tmp_path / name)
+            with pytest.raises(FileFormatError, match=f"{name}: is a pipe or a device"):
+                read(tmp_path / name)
 
 
 # -------------------------------------------------------------------------------------------------------------- blocks
@@ -234,15 +203,15 @@ FILES = {
 
 def assert_same(blocks, scan):
     def columns(blocks):
-        held = [{"positions": b.positions, "colors": b.colors, "normals": b.normals, **b.attributes} for b in blocks]
-        names = [name for name, values in held[0].items() if values is not None]
-        return {name: np.concatenate([each[name] for each in held]) for name in names}
+        arrays = [{"positions": b.positions, "colors": b.colors, "normals": b.normals, **b.attributes} for b in blocks]
+        names = [name for name, values in arrays[0].items() if values is not None]
+        return {name: np.concatenate([block[name] for block in arrays]) for name in names}
 
-    found, expected = columns(blocks), columns([scan])
-    assert found.keys() == expected.keys()
+    joined, expected = columns(blocks), columns([scan])
+    assert joined.keys() == expected.keys()
     for name, values in expected.items():
-        assert found[name].dtype == values.dtype, name
-        np.testing.assert_array_equal(found[name], values, name)
+        assert joined[name].dtype == values.dtype, name
+        np.testing.assert_array_equal(joined[name], values, name)
 
 
 @pytest.mark.parametrize("make", FILES.values(), ids=FILES)

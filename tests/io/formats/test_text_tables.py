@@ -11,7 +11,7 @@ from glsk_o3d.io.scans import read_scan
 XYZ = [[1.5, 2, 3], [4, 5.25, 6]]
 
 ROWS = ["1.5 2 3 255 0 51 0.5 0 0 1", "4 5.25 6 0 255 0 7 0 1 0"]
-LAYOUTS = {  # the ending, the line of names, and what parts the numbers
+LAYOUTS = {  # the ending, the line of names, and the delimiter
     "CloudCompare": (".asc", "//X Y Z R G B Scalar_field Nx Ny Nz\n2", " "),
     "CloudCompare, csv": (".csv", "//X,Y,Z,R,G,B,Scalar field,Nx,Ny,Nz", ","),
     "pandas": (".csv", "x,y,z,red,green,blue,Scalar field,nx,ny,nz", ","),
@@ -25,10 +25,10 @@ RANDOM = np.random.default_rng(4)
 
 @pytest.mark.parametrize("program", LAYOUTS)
 def test_named_columns(tmp_path, program):
-    ending, names, apart = LAYOUTS[program]
+    ending, names, delimiter = LAYOUTS[program]
     name = f"c{ending}"
-    names = names.replace(" ", "\t") if apart == "\t" else names
-    (tmp_path / name).write_text("\n".join([names, *(row.replace(" ", apart) for row in ROWS), ""]))
+    names = names.replace(" ", "\t") if delimiter == "\t" else names
+    (tmp_path / name).write_text("\n".join([names, *(row.replace(" ", delimiter) for row in ROWS), ""]))
     scan = read_scan(tmp_path / name)
     np.testing.assert_array_equal(scan.positions, XYZ)
     np.testing.assert_allclose(scan.colors, [[1, 0, 0.2], [0, 1, 0]])
@@ -81,27 +81,24 @@ def test_attributes_become_those_of_a_tensor_cloud(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "why"),
+    ("text", "noun"),
     [
-        ("these are\nwords alone, and no more\n", "no line of its beginning has three numbers"),
-        ("x;y;z\n" + 2 * "1.234,5;2.345,6;3.456,7\n", "no line of its beginning has three numbers"),
-        ("0 0 0\n" + 2 * "a b c\n", "2 of 3 lines hold no point; commas between columns and in numbers"),
-        (
-            "x,y,z\n1,5,2,5,3,5\n",
-            "commas between columns and in numbers are not understood: part columns by semicolons",
-        ),
-        ("x,y,z,label\n1,64,1,27,1,04,7\n", "commas between columns and in numbers are not understood"),
-        ("x,y,z\n0,0,0\n" + 9 * "1,25,0,33,1,5\n", "commas between columns and in numbers are not understood"),
-        ("1,64,1,27,1,40\n1,64,-1,07,1,04\n", "commas between columns and in numbers are not understood"),
-        (2 * '"1,5","2,5","3,5"\n', "2 of 2 lines hold no point; commas between columns and in numbers"),
-        ("ncols 4\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3 4\n", "it is a grid of heights"),
-        ("length,radius,angle\n1,2,3\n", "its columns are called length, radius, angle: call three of them x, y and z"),
+        ("these are\nwords alone, and no more\n", "three numbers"),
+        ("x;y;z\n" + 2 * "1.234,5;2.345,6;3.456,7\n", "three numbers"),
+        ("0 0 0\n" + 2 * "a b c\n", "2 of 3 lines hold no point"),
+        ("x,y,z\n1,5,2,5,3,5\n", "commas"),
+        ("x,y,z,label\n1,64,1,27,1,04,7\n", "commas"),
+        ("x,y,z\n0,0,0\n" + 9 * "1,25,0,33,1,5\n", "commas"),
+        ("1,64,1,27,1,40\n1,64,-1,07,1,04\n", "commas"),
+        (2 * '"1,5","2,5","3,5"\n', "2 of 2 lines hold no point; commas"),
+        ("ncols 4\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3 4\n", "grid of heights"),
+        ("length,radius,angle\n1,2,3\n", "length, radius, angle"),
     ],
 )
-def test_text_that_is_no_cloud(tmp_path, text, why):
+def test_text_that_is_no_cloud(tmp_path, text, noun):
     (tmp_path / "c.csv").write_text(text)
-    assert holds_points(tmp_path / "c.csv") == ("hold no point" in why)
-    with pytest.raises(FileFormatError, match=rf"c\.csv: no points could be read: {why}"):
+    assert holds_points(tmp_path / "c.csv") == ("hold no point" in noun)
+    with pytest.raises(FileFormatError, match=rf"c\.csv: no points could be read: .*{noun}"):
         read_cloud(tmp_path / "c.csv")
 
 
@@ -120,13 +117,13 @@ def test_commas_that_part_columns_alone(tmp_path, text):
     np.testing.assert_array_equal(np.floor(read_scan(tmp_path / "c.csv").positions[0]), [1, 2, 3])
 
 
-@pytest.mark.parametrize("apart", [";", " ; ", "\t", "  "])
+@pytest.mark.parametrize("delimiter", [";", " ; ", "\t", "  "])
 @pytest.mark.parametrize("head", ["", "x y z label\n", "0 0 0 0\n"], ids=["bare", "names", "whole"])
 @pytest.mark.parametrize("form", ["{:.17f}", "{:+.16e}"])
-def test_decimal_commas(tmp_path, apart, head, form):
+def test_decimal_commas(tmp_path, delimiter, head, form):
     rows = [*RANDOM.normal(size=(5, 3)) * 1000]
-    lines = [apart.join([*(form.format(value).replace(".", ",") for value in row), "7"]) for row in rows]
-    (tmp_path / "c.csv").write_text(head.replace(" ", apart) + "\n".join(lines) + "\n")
+    lines = [delimiter.join([*(form.format(value).replace(".", ",") for value in row), "7"]) for row in rows]
+    (tmp_path / "c.csv").write_text(head.replace(" ", delimiter) + "\n".join(lines) + "\n")
     assert holds_points(tmp_path / "c.csv")
     scan = read_scan(tmp_path / "c.csv")
     np.testing.assert_allclose(scan.positions[-5:], rows, rtol=1e-15)
@@ -137,8 +134,8 @@ def test_decimal_commas(tmp_path, apart, head, form):
     "head", ["# exported by CloudCompare\n", "my scan\n", "X,Y,Z\n[m],[m],[m]\n", "// 1 of 3\n", "Höhe über Null\n"]
 )
 def test_what_may_stand_above_the_points(tmp_path, head):
-    apart = "," if "," in head else " "
-    text = head + "".join(apart.join(("1.5", "2", str(i))) + "\n" for i in range(3))
+    delimiter = "," if "," in head else " "
+    text = head + "".join(delimiter.join(("1.5", "2", str(i))) + "\n" for i in range(3))
     (tmp_path / "c.txt").write_bytes(text.encode("latin-1"))
     assert holds_points(tmp_path / "c.txt")
     np.testing.assert_array_equal(read_scan(tmp_path / "c.txt").positions, [[1.5, 2, i] for i in range(3)])
