@@ -46,10 +46,10 @@ def test_arrays_and_array_likes_of_real_numbers(o3d):
         pass
 
     for dtype in ("f2", "f4", "g", "i1", "i8", "u4", ">f8"):
-        given = (10 * np.abs(XYZ)).astype(dtype)
-        np.testing.assert_array_equal(cloud_points(given), given.astype(float))
-    for given in (XYZ.tolist(), np.asfortranarray(XYZ), Scan(o3d.utility.Vector3dVector(XYZ))):
-        np.testing.assert_array_equal(cloud_points(given), XYZ)
+        array = (10 * np.abs(XYZ)).astype(dtype)
+        np.testing.assert_array_equal(cloud_points(array), array.astype(float))
+    for cloud in (XYZ.tolist(), np.asfortranarray(XYZ), Scan(o3d.utility.Vector3dVector(XYZ))):
+        np.testing.assert_array_equal(cloud_points(cloud), XYZ)
     np.testing.assert_array_equal(cloud_points(XYZ[::-2]), XYZ[::-2])
     assert np.isnan(cloud_points([[np.nan, 0, 0]])[0, 0])
 
@@ -69,18 +69,13 @@ def test_what_is_no_cloud_is_refused(cloud):
         cloud_points(cloud)
 
 
-def test_other_geometries_are_refused(o3d):
-    for geometries in (o3d.geometry, o3d.t.geometry):
-        with pytest.raises(InvalidCloudError, match=r"Open3D LineSet is no cloud: give .* \(N, 3\) array"):
-            cloud_points(geometries.LineSet())
-
-
-def test_empty_clouds_are_refused(o3d):
-    geometries = [g.PointCloud() for g in (o3d.geometry, o3d.t.geometry)]
-    geometries += [g.TriangleMesh() for g in (o3d.geometry, o3d.t.geometry)]
-    for cloud in (*geometries, [], np.empty((0, 3)), np.empty((0, 3), int)):
-        with pytest.raises(InvalidCloudError, match="empty"):
-            cloud_points(cloud)
+def test_other_and_empty_geometries_are_refused(o3d):
+    for geometry in (o3d.geometry, o3d.t.geometry):
+        with pytest.raises(InvalidCloudError, match="Open3D LineSet"):
+            cloud_points(geometry.LineSet())
+        for cloud in (geometry.PointCloud(), geometry.TriangleMesh(), [], np.empty((0, 3)), np.empty((0, 3), int)):
+            with pytest.raises(InvalidCloudError, match="empty"):
+                cloud_points(cloud)
 
 
 @pytest.mark.parametrize(
@@ -91,17 +86,17 @@ def test_empty_clouds_are_refused(o3d):
 def test_counts_that_are_none_are_refused(o3d, counts):
     cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(XYZ))
     cloud.point.sample_count = o3d.core.Tensor(np.repeat(np.array(counts, float), len(XYZ), axis=0))
-    with pytest.raises(InvalidCloudError, match=r"attribute sample_count .*must .*rename"):
+    with pytest.raises(InvalidCloudError, match="attribute sample_count"):
         RingBuilder()(cloud)
 
 
 def test_counts_are_of_any_real_type(o3d):
     cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(XYZ))
-    some = np.arange(9) < 6
-    assert cloud_counts(cloud, some) == (None, 6, 3)
+    finite = np.arange(9) < 6
+    assert cloud_counts(cloud, finite) == (None, 6, 3)
     for dtype in ("i4", "u1", "i8", "f4"):
         cloud.point.sample_count = o3d.core.Tensor(np.arange(1, 10).astype(dtype)[:, None])
-        counts, n, others = cloud_counts(cloud, some)
+        counts, n, others = cloud_counts(cloud, finite)
         np.testing.assert_array_equal(counts, np.arange(1, 7))
         assert (n, others) == (21, 24)
     cloud.point.sample_count = o3d.core.Tensor(np.full((9, 1), 2.0**59))

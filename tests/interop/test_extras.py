@@ -37,7 +37,7 @@ from pathlib import Path
 from glsk_o3d.apps.crosscheck import cross_check
 for ending in ("las", "laz", "e57"):
     Path(f"scan.{ending}").write_bytes(b"any")
-asking = {
+requests = {
     "preview": lambda: glsk.save_preview(skeleton, "s.png"),
     "report": lambda: glsk.save_report(skeleton, "s.html"),
     "graph": skeleton.to_networkx,
@@ -51,13 +51,13 @@ asking = {
     "e57": lambda: glsk.read_cloud("scan.e57"),
     "batch": lambda: glsk.batch.run_batch("s.ply", "out", preview=True),
 }
-said = {}
-for name, ask in asking.items():
+messages = {}
+for name, request in requests.items():
     try:
-        ask()
+        request()
     except glsk.MissingPackageError as error:
-        said[name] = str(error)
-print(json.dumps(said))
+        messages[name] = str(error)
+print(json.dumps(messages))
 """
 NAMED = {
     **dict.fromkeys(("preview", "report", "plot", "colours", "batch"), "pictures"),
@@ -80,19 +80,19 @@ def bare(tmp_path):
 def test_without_extras(bare, tmp_path):
     done = bare(WORKS + ASKS)
     assert (done.returncode, done.stderr) == (0, "")
-    said = json.loads(done.stdout)
-    assert said.keys() == NAMED.keys()
-    for name, message in said.items():
+    messages = json.loads(done.stdout)
+    assert messages.keys() == NAMED.keys()
+    for name, message in messages.items():
         assert f'pip install "glsk-o3d[{NAMED[name]}]"' in message, name
-    left = {path.name for path in tmp_path.iterdir() if path.name.partition(".")[0] not in ("s", "scan")}
-    assert left - {"out"} == {"r.json", "branches.csv"}
+    written = {path.name for path in tmp_path.iterdir() if path.name.partition(".")[0] not in ("s", "scan", "out")}
+    assert written == {"r.json", "branches.csv"}
     assert not list(tmp_path.glob("*.png")) + list(tmp_path.glob("*.html"))
 
 
 COMMAND = "from glsk_o3d.cli.main import app; app(sys.argv[1:])"
 
 
-def test_the_command_asks_before_the_work(bare, tmp_path):
+def test_the_command_names_the_extra_before_the_work(bare, tmp_path):
     (tmp_path / "scan.xyz").write_text("0 0 0\n")  # not looked at: what cannot be written comes first
     done = bare(COMMAND, "skeletonize", "scan.xyz", "-o", "s.ply", "--preview", "s.png")
     assert done.returncode == 1
@@ -103,7 +103,7 @@ def test_the_command_asks_before_the_work(bare, tmp_path):
 PYMESHLAB = 'pymeshlab cannot be imported: pip install "glsk-o3d[meshlab]"\n'
 
 
-def test_a_filter_script_says_at_once_what_it_needs(bare):
+def test_a_filter_script_names_its_extra_before_the_work(bare):
     assert bare(COMMAND, "run", "--list").returncode == 0
     done = bare(COMMAND, "run", "scan_cleanup", "nowhere.ply", "-o", "c.ply")  # the scan is not looked at
     assert (done.returncode, done.stderr) == (1, f"glsk: error: {PYMESHLAB}")

@@ -10,7 +10,7 @@ from glsk_o3d.interop import packages
 
 
 @pytest.mark.parametrize(
-    ("package", "error", "says"),
+    ("package", "error", "message"),
     [
         ("open3d", ModuleNotFoundError("No module", name="open3d"), 'cannot be imported: pip install "open3d"$'),
         ("igl", ModuleNotFoundError("No module", name="igl"), r'pip install "glsk-o3d\[crosscheck\]"$'),
@@ -19,12 +19,12 @@ from glsk_o3d.interop import packages
         ("open3d", OSError("libGL.so.1: cannot open shared object file"), r"needs libGL\.so\.1, which .* libgl1 "),
     ],
 )
-def test_a_missing_package_says_what_to_install(monkeypatch, package, error, says):
+def test_the_error_for_a_missing_package_names_what_to_install(monkeypatch, package, error, message):
     def fail(name):
         raise error
 
     monkeypatch.setattr("importlib.import_module", fail)
-    with pytest.raises(MissingPackageError, match=f"^{package} .*{says}") as caught:
+    with pytest.raises(MissingPackageError, match=f"^{package} .*{message}") as caught:
         packages.require(package)
     assert caught.value.__cause__ is error
 
@@ -33,7 +33,7 @@ def test_extras_and_libraries_are_those_of_the_project(root):
     extras = tomlkit.parse((root / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     names = {"igl": "libigl"}
     for module, extra in packages.EXTRA_OF.items():
-        asked = [key for key in extras if any(it.startswith(f"{names.get(module, module)}>=") for it in extras[key])]
-        assert asked == [extra]
+        requirement = f"{names.get(module, module)}>="
+        assert [key for key in extras if any(line.startswith(requirement) for line in extras[key])] == [extra]
     script = (root / "scripts" / "system-deps.sh").read_text()
     assert set(re.findall(r"=(lib[\w.-]+)", script)) <= set(packages._OPEN3D_LIBRARIES.split())

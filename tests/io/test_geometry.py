@@ -35,15 +35,15 @@ def test_a_line_set_has_its_own_copy_of_the_graph(skeleton):
 
 @pytest.mark.parametrize("count", [0, 1])
 @pytest.mark.parametrize("color", [*COLOR_NAMES, (0.1, 0.2, 0.3)])
-def test_in_colour_without_edges(count, color):
-    lone = Skeleton(np.zeros((count, 3)), (), np.ones(count), (), (), (), confidence=np.ones(count))
-    lines = to_line_set(lone, color)
+def test_colours_without_edges(count, color):
+    detached = Skeleton(np.zeros((count, 3)), (), np.ones(count), (), (), (), confidence=np.ones(count))
+    lines = to_line_set(detached, color)
     assert (len(lines.points), len(lines.lines), len(lines.colors)) == (count, 0, 0)
-    assert len(to_tubes(lone, color).vertex_colors) == len(to_tubes(lone, color).vertices)
+    assert len(to_tubes(detached, color).vertex_colors) == len(to_tubes(detached, color).vertices)
 
 
 @pytest.mark.parametrize("color", COLOR_NAMES)
-def test_what_belongs_to_nothing_or_is_not_known_is_grey(tree, color):
+def test_no_branch_and_unknown_values_are_grey(tree, color):
     shown = shades(tree, color, BRANCH, VERTICES)
     assert shown.shape == (3, 3)
     np.testing.assert_array_equal(shown[2], UNKNOWN_GREY)
@@ -60,7 +60,7 @@ def test_branches_differ_orders_go_up_and_values_are_means_over_vertices(tree):
     np.testing.assert_array_equal(*by_radius)
     order = branch_table(tree).order
     shown = shades(tree, "order", np.arange(len(order)), np.zeros(len(order), int))
-    dark, light = (np.unique(shown[order == each], axis=0) for each in (0, 1))
+    dark, light = (np.unique(shown[order == level], axis=0) for level in (0, 1))
     assert len(dark) == len(light) == 1
     assert dark.sum() < light.sum()
 

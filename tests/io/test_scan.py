@@ -14,7 +14,7 @@ COMPARISONS = ["label == 1", "label != 2", "x < 7", "y>=12", "x <= 9", "label in
 
 
 @given(st.lists(st.sampled_from([*COMPARISONS, "origin >= 2", "origin in (2.25, 4)"]), min_size=1))
-def test_it_means_what_python_means(comparisons):
+def test_a_condition_means_what_it_means_in_python(comparisons):
     where = " and ".join(comparisons)
     rows = [dict(x=i, y=2 * i, z=3 * i, label=i % 3, origin=i / 4) for i in N.tolist()]
     assert SCAN.chosen(where).tolist() == [eval(where, {}, row) for row in rows]
@@ -23,10 +23,9 @@ def test_it_means_what_python_means(comparisons):
 @pytest.mark.parametrize(
     ("where", "why"),
     [
-        ("lable == 1", r"did you mean 'label'\? \(there are x, y, z, label, origin"),
-        ("origi > 1", "did you mean 'origin'"),
-        ("if == 1", "no attribute of the points is called 'if': there are x, y, z, label, origin"),
-        *((where, "not understood: compare attributes with numbers") for where in (
+        ("lable == 1", "did you mean 'label'"),
+        ("if == 1", "'if': there are x, y, z, label, origin"),
+        *((where, "not understood") for where in (
             *("label = 1", "label", "label + 1 == 2", "x.__class__ == 1", "label == 'oak'", "", "label == 1 or x > 2"),
             *("0 < z < 2", "x > y", "label in (1, oak)", "not x > 1", "label in 1 and", "x > 1 and " * 100_000),
             "label in (1",
@@ -39,9 +38,9 @@ def test_what_is_no_condition(where, why):
         SCAN.chosen(where)
 
 
-def test_all_that_is_known_is_selected():
+def test_colours_normals_and_attributes_are_selected():
     assert SCAN.chosen("class == 4").sum() == 1
     scan = Scan(SCAN.positions, SCAN.positions / 60, SCAN.positions, SCAN.attributes, np.array([[0, 1, 2]]))
-    some = scan[scan.chosen("label == 1")]
-    assert len(some) == len(some.colors) == len(some.normals) == len(some.attributes["label"]) == 7
-    assert len(some.triangles) == 0
+    selected = scan[scan.chosen("label == 1")]
+    assert len(selected) == len(selected.colors) == len(selected.normals) == len(selected.attributes["label"]) == 7
+    assert len(selected.triangles) == 0

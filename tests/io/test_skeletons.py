@@ -63,15 +63,15 @@ def test_broken_off_files(tree, tmp_path, ending):
 
 
 @pytest.mark.parametrize("ending", FORMATS)
-def test_saving_twice_gives_the_same_bytes_and_what_is_only_written_is_not_read(tree, loop, tmp_path, ending):
+def test_saving_is_deterministic_and_refuses_loops_in_trees(tree, loop, tmp_path, ending):
     for name in "ab":
         save_skeleton(tree, tmp_path / f"{name}{ending}")
     assert (tmp_path / f"a{ending}").read_bytes() == (tmp_path / f"b{ending}").read_bytes()
     if ending not in READABLE:
-        with pytest.raises(FileFormatError, match=rf"a\{ending}: \{ending} is only written; read are .*\.ply"):
+        with pytest.raises(FileFormatError, match="only written"):
             read_skeleton(tmp_path / f"a{ending}")
     if FORMATS[ending].trees:
-        with pytest.raises(FileFormatError, match=r"2 loop.*cut_loops=True"):
+        with pytest.raises(FileFormatError, match=r"2 loop.*cut_loops"):
             save_skeleton(loop, tmp_path / f"c{ending}")
         assert not (tmp_path / f"c{ending}").exists()
         save_skeleton(loop, tmp_path / f"c{ending}", cut_loops=True)
@@ -114,7 +114,10 @@ def test_endings(tree, tmp_path, assert_identical):
         with pytest.raises(FileFormatError, match=r"\.ply.*\.obj.*\.json.*\.urdf"):
             save_skeleton(tree, tmp_path / name)
     assert not list(tmp_path.iterdir())
-    save_skeleton(tree, tmp_path / "S.JSON")
+    for name in ("S.JSON", *(f"s{ending}" for ending in READABLE)):
+        assert not holds_skeleton(tmp_path / name)
+        save_skeleton(tree, tmp_path / name)
+        assert holds_skeleton(tmp_path / name)
     assert_identical(read_skeleton(tmp_path / "S.JSON"), tree)
 
 
@@ -131,15 +134,8 @@ def test_a_scan_is_no_skeleton(cloud, tmp_path, ending, mesh):
     else:
         path.write_text("v 0 0 0\nv 1 0 0\n")
     assert not holds_skeleton(path)
-    with pytest.raises(FileFormatError, match=rf"c\{ending}: is a cloud, not a skeleton: make one with skeletonize"):
+    with pytest.raises(FileFormatError, match=rf"c\{ending}: is a cloud"):
         read_skeleton(path)
-
-
-@pytest.mark.parametrize("ending", READABLE)
-def test_whether_a_file_holds_a_skeleton(skeleton, tmp_path, ending):
-    assert not holds_skeleton(tmp_path / f"s{ending}")
-    save_skeleton(skeleton, tmp_path / f"s{ending}", cut_loops=True)
-    assert holds_skeleton(tmp_path / f"s{ending}")
 
 
 def test_edges_of_others_are_sorted_and_each_is_there_once():
