@@ -34,8 +34,8 @@ def test_meshes_give_their_vertices_or_a_sample(tmp_path, ending, resolution, co
     mesh, path = o3d.geometry.TriangleMesh.create_sphere(2.0, resolution), tmp_path / f"m.{ending}"
     mesh.compute_vertex_normals()
     o3d.io.write_triangle_mesh(str(path), mesh)
-    centres = (np.asarray(each.vertices)[np.asarray(each.triangles)].mean(axis=1) for each in (read_mesh(path), mesh))
-    np.testing.assert_allclose(*(np.sort(each, axis=0) for each in centres), atol=1e-3)
+    centres = (np.asarray(m.vertices)[np.asarray(m.triangles)].mean(axis=1) for m in (read_mesh(path), mesh))
+    np.testing.assert_allclose(*(np.sort(rows, axis=0) for rows in centres), atol=1e-3)
     assert len(read_scan(path)) >= len(mesh.vertices)
     assert (len(read_cloud(path).points) == 25000) == coarse
 
@@ -95,11 +95,11 @@ def test_what_is_no_mesh(cloud, tmp_path):
 
 @pytest.mark.parametrize("name", [f"s{ending}" for ending in READABLE] + ["c.md", "c.bin"])
 def test_what_is_no_scan(skeleton, tmp_path, name):
-    says = r"is a skeleton" if name in ("s.ply", "s.obj") else r"unknown ending; .*\.ply.*\.pcd"
+    error = r"is a skeleton" if name in ("s.ply", "s.obj") else r"unknown ending; .*\.ply.*\.pcd"
     save_skeleton(skeleton, tmp_path / (name if name[0] == "s" else "c.ply"), cut_loops=True)
     if name[0] == "c":
         (tmp_path / "c.ply").rename(tmp_path / name)
-    with pytest.raises(FileFormatError, match=rf"{name}: {says}"):
+    with pytest.raises(FileFormatError, match=rf"{name}: {error}"):
         read_cloud(tmp_path / name)
 
 
@@ -257,7 +257,7 @@ OTHERS = {"STL": stl, "PLY text": open3d("c.ply", write_ascii=True), "PCD compre
 
 
 @pytest.mark.parametrize("name", [*FILES, *OTHERS])
-def test_files_that_break_off_are_refused_wherever(tmp_path, capfd, name):
+def test_files_that_break_off_anywhere_are_refused(tmp_path, capfd, name):
     path = (FILES | OTHERS)[name](tmp_path)
     whole = path.read_bytes()
     last = whole.rstrip(b"\n").rfind(b"\n") if "text" in name else len(whole) - (40 if name[0] == "L" else 1)

@@ -83,10 +83,6 @@ class Element(NamedTuple):
         kinds += [column.kind for column in self.columns if column.counts and self.name == "face"]
         return self.rows * sum(np.dtype(kind).itemsize for kind in kinds)
 
-    def check(self, rows: int) -> None:
-        """Raise ValueError where the file has fewer rows."""
-        check_promised(self.rows, rows, "points" if self.name == "vertex" else f"rows of {self.name!r}")
-
 
 def check_elements(elements: list[Element], size: int) -> None:
     """Raise ValueError where elements take more than so many bytes, or fewer of several without lists, or names repeat.
@@ -97,7 +93,8 @@ def check_elements(elements: list[Element], size: int) -> None:
     for element in elements:
         if len({column.name for column in element.columns}) < max(len(element.columns), element.rows > 0):
             raise ValueError(f"element {element.name!r} has two properties of one name, or none")
-        element.check((size - start) * element.rows // max(element.least(), 1))
+        what = "points" if element.name == "vertex" else f"rows of {element.name!r}"
+        check_promised(element.rows, (size - start) * element.rows // max(element.least(), 1), what)
         start += element.least()
     filled = [element for element in elements if element.rows]
     if start < size and len(filled) > 1 and not any(element.lists for element in filled):
@@ -214,12 +211,10 @@ def _row_by_row(data: bytes, start: int, element: Element, order: str) -> tuple[
 
 def write(skeleton: Skeleton) -> bytes:
     """The content of a PLY file of a skeleton."""
-    columns = dict(zip("xyz", skeleton.vertices.T, strict=True)) | {"radius": skeleton.radii, "quality": skeleton.radii}
-    vertices = rows_of(columns | {name: getattr(skeleton, name) for name in SECTION})
+    columns = {"positions": skeleton.vertices, "radius": skeleton.radii, "quality": skeleton.radii}
+    vertices = rows_of(columns_of(columns | {name: getattr(skeleton, name) for name in SECTION}))
     edges = f"element edge {len(skeleton.edges)}\nproperty int vertex1\nproperty int vertex2\n"
-    header = header_of(
-        vertices.dtype, len(vertices), comment="comment curve skeleton written by glsk-o3d\n", more=edges
-    )
+    header = header_of(vertices.dtype, len(vertices), comment="curve skeleton written by glsk-o3d", more=edges)
     return header + vertices.tobytes() + skeleton.edges.astype("<i4").tobytes()
 
 
@@ -293,12 +288,14 @@ def triangles(faces: Table, n: int) -> np.ndarray:
 
 def save(path: Path, arrays: Mapping[str, ArrayLike], triangles: ArrayLike | None = None) -> None:
     """Write points with what `columns_of` takes, and triangles (T, 3) between them, as `write_atomically` does."""
-    vertices, corners, more = rows_of(columns_of(arrays)), np.asarray(() if triangles is None else triangles), ""
-    faces = np.empty(len(corners), [("n", "u1"), ("corners", "<i4", 3)])
+    vertices, more, faces = rows_of(columns_of(arrays)), "", b""
     if triangles is not None:
-        faces["n"], faces["corners"] = 3, corners
-        more = f"element face {len(faces)}\nproperty list uchar int vertex_indices\n"
-    data = header_of(vertices.dtype, len(vertices), more=more) + vertices.tobytes() + faces.tobytes()
+        corners = np.asarray(triangles).reshape(-1, 3)
+        more = f"element face {len(corners)}\nproperty list uchar int vertex_indices\n"
+        rows = np.zeros(len(corners), [("count", "u1"), ("corners", "<i4", 3)])
+        rows["count"], rows["corners"] = 3, corners
+        faces = rows.tobytes()
+    data = header_of(vertices.dtype, len(vertices), more=more) + vertices.tobytes() + faces
     write_atomically(path, lambda temporary: temporary.write_bytes(data))
 
 
@@ -335,9 +332,10 @@ def append(path: Path, rows: np.ndarray, n: int) -> int:
 
 
 def header_of(row: np.dtype, n: int, *, width: int = 0, comment: str = "", more: str = "") -> bytes:
-    """What stands before n such rows; the count can be padded to a width, so that another one fits in its place, and
-    `more` are lines of elements that follow.
+    """The header of n such rows; the count can be padded to a width, so that another one fits in its place, and `more`
+    are lines of elements that follow.
     """
     properties = "".join(f"property {WRITTEN_KINDS[row[name].str[1:]]} {name}\n" for name in row.names or ())
-    vertices = f"{comment}element vertex {n:{width}d}\n"
-    return f"ply\nformat binary_little_endian 1.0\n{vertices}{properties}{more}end_header\n".encode()
+    vertices = f"element vertex {n:{width}d}\n{properties}"
+    comment = f"comment {comment}\n" if comment else ""
+    return f"ply\nformat binary_little_endian 1.0\n{comment}{vertices}{more}end_header\n".encode()

@@ -1,4 +1,4 @@
-"""A rig: what a glTF library finds in it, and that turning a bone moves what hangs on it and nothing else."""
+"""A rig in a glTF library: turning a bone moves the surface of its limb alone."""
 
 import numpy as np
 import pytest
@@ -72,7 +72,7 @@ def test_at_rest_the_surface_and_the_joints_are_in_their_places(tree, rig, up, o
     np.testing.assert_allclose(heads, bones.vertices[bones.edges[:, 0]] @ turn.T, rtol=0, atol=1e-5)
 
 
-def test_turning_a_bone_moves_what_hangs_on_it_and_nothing_else(rig):
+def test_turning_a_bone_moves_its_limb_alone(rig):
     fork = Skeleton([[0, 0, 0], [0, 0, 1], [0, 1, 2], [0, -1, 2]], [[0, 1], [1, 2], [1, 3]], [0.1] * 4, (), (), ())
     cloud = np.array([[0, 0, 0.2], [0, 0, 0.8], [0, 0.9, 1.9], [0, -0.9, 1.9], [0, 0.25, 1.25]])
     file = rig(fork, cloud, up="y", root=0)
@@ -89,8 +89,8 @@ def test_triangles_normals_and_colours_go_along(tree, rig):
     import open3d as o3d
 
     mesh = to_tubes(tree, (1.0, 0.5, 0.0))
-    for given in (mesh, o3d.t.geometry.TriangleMesh.from_legacy(mesh)):
-        file = rig(tree, given)
+    for surface in (mesh, o3d.t.geometry.TriangleMesh.from_legacy(mesh)):
+        file = rig(tree, surface)
         part = file.meshes[0].primitives[0]
         assert part.mode == 4
         np.testing.assert_array_equal(accessor(file, part.indices).reshape(-1, 3), np.asarray(mesh.triangles))

@@ -87,13 +87,12 @@ def test_polygons_of_obj(tmp_path, form, ends, shift):
     np.testing.assert_allclose(area(scan), 2 + 4 / 3, rtol=1e-9)
 
 
-def test_corners_that_are_counted_back_from_where_they_stand(tmp_path):
+def test_negative_corners_count_back_from_their_line(tmp_path):
     layers = [f"v 0 0 {z}\nv 1 0 {z}\nv 1 1 {z}\nv 0 1 {z}\nf -4 -3 -2 -1\n" for z in range(3)]
     (tmp_path / "m.obj").write_text("".join(layers))
     scan = read_scan(tmp_path / "m.obj")
-    np.testing.assert_array_equal(
-        scan.triangles, [each + 4 * z for z in range(3) for each in np.array([[0, 1, 2], [0, 2, 3]])]
-    )
+    first = np.array([[0, 1, 2], [0, 2, 3]])
+    np.testing.assert_array_equal(scan.triangles, np.concatenate([first, first + 4, first + 8]))
     assert area(scan) == 3
 
 
@@ -108,14 +107,14 @@ def test_polygons_of_many_corners(tmp_path, n):
     np.testing.assert_allclose(scan.colors[:-1], np.column_stack([angle / 7, 0 * angle + 0.5, 0 * angle + 1]))
 
 
-@pytest.mark.parametrize(("corner", "kept"), [("{0}//{0}", True), ("{0}/1/{0}", True), ("{0}//1", False)])
-def test_normals_are_kept_where_they_are_those_of_vertices(tmp_path, corner, kept):
+@pytest.mark.parametrize(("corner", "of_vertices"), [("{0}//{0}", True), ("{0}/1/{0}", True), ("{0}//1", False)])
+def test_normals_of_vertices_are_read(tmp_path, corner, of_vertices):
     normals = "".join(f"vn {x} {y} {z}\n" for x, y, z in CUBE)
     faces = "".join("f " + " ".join(corner.format(i) for i in quad) + "\n" for quad in QUADS)
     (tmp_path / "m.obj").write_text(POINTS + "vt 0 0\n" + normals + faces)
     scan = read_scan(tmp_path / "m.obj")
-    assert (scan.normals is not None) == kept
-    if kept:
+    assert (scan.normals is not None) == of_vertices
+    if of_vertices:
         np.testing.assert_array_equal(scan.normals, CUBE)
 
 

@@ -29,7 +29,7 @@ def ply(format, *elements):
             for column, value in zip(columns, row, strict=True):
                 *_, count, kind, _ = ["", "", *column.split()]
                 if column.startswith("list"):
-                    words += [(count, len(value)), *((kind, each) for each in value)]
+                    words += [(count, len(value)), *((kind, item) for item in value)]
                 else:
                     words.append((kind, value))
             if format == "ascii":
@@ -153,8 +153,14 @@ def test_properties_of_all_kinds(scan, format):
 def test_a_file_that_ends_anywhere_before_its_tables_do_is_refused(scan, format, lists):
     faces = [((0, 1, 2),), ((0, 1, 2, 3),), ((1, 2, 3),)]
     for elements in (
-        [("odd", ["list uchar ushort some", "int more"], [(each, 7) for each in lists]), ("vertex", XYZ, SQUARE)],
-        [("vertex", [*XYZ, "list uchar int near"], [(*at, each) for at, each in zip(SQUARE, lists, strict=True)])],
+        [("odd", ["list uchar ushort some", "int more"], [(items, 7) for items in lists]), ("vertex", XYZ, SQUARE)],
+        [
+            (
+                "vertex",
+                [*XYZ, "list uchar int near"],
+                [(*place, items) for place, items in zip(SQUARE, lists, strict=True)],
+            )
+        ],
         [("vertex", XYZ, SQUARE), ("face", FACE, faces)],
     ):
         whole = ply(format, *elements).rstrip(b"\n")
