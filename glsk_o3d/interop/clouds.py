@@ -42,7 +42,7 @@ class SurfaceMesh(NamedTuple):
     triangles: np.ndarray  # (T, 3) int
 
 
-class Content(NamedTuple):
+class _Content(NamedTuple):
     """The arrays of what carries points, unchecked."""
 
     points: Any
@@ -119,24 +119,24 @@ def cloud_counts(cloud: Any, finite: np.ndarray) -> tuple[np.ndarray | None, int
     return counts[finite], int(counts[finite].sum()), int(counts[~finite].sum())
 
 
-def _content(cloud: Any) -> Content:
+def _content(cloud: Any) -> _Content:
     """The arrays in a cloud, which may be `cloud` itself; Open3D's classes by name, so as not to import it."""
     if isinstance(cloud, CountedPoints):
-        return Content(cloud.points, counts=cloud.counts)
+        return _Content(cloud.points, counts=cloud.counts)
     if isinstance(cloud, SurfaceMesh):
-        return Content(*cloud)
+        return _Content(*cloud)
     name, tensor = open3d_class(cloud)
     if name == "" or name.endswith("Vector"):
-        return Content(cloud)
+        return _Content(cloud)
     if name == "Tensor":
-        return Content(cloud.cpu().numpy())
+        return _Content(cloud.cpu().numpy())
     if name not in ("PointCloud", "TriangleMesh"):
         raise InvalidCloudError(f"an Open3D {name} is no cloud: give {ACCEPTED}")
     if not tensor:
-        return Content(cloud.points) if name == "PointCloud" else Content(cloud.vertices, cloud.triangles)
+        return _Content(cloud.points) if name == "PointCloud" else _Content(cloud.vertices, cloud.triangles)
     if name == "PointCloud":
-        return Content(_array(cloud.point, "positions", NO_ROWS), counts=_array(cloud.point, SAMPLE_COUNT, None))
-    return Content(_array(cloud.vertex, "positions", NO_ROWS), _array(cloud.triangle, "indices", NO_ROWS))
+        return _Content(_array(cloud.point, "positions", NO_ROWS), counts=_array(cloud.point, SAMPLE_COUNT, None))
+    return _Content(_array(cloud.vertex, "positions", NO_ROWS), _array(cloud.triangle, "indices", NO_ROWS))
 
 
 def _array(attributes: Any, name: str, default: np.ndarray | None) -> np.ndarray | None:

@@ -1,4 +1,4 @@
-"""Files that are to be read: their endings, and whether they hold what they promise.
+"""Files that are read: their endings, rows of numbers, and errors where they do not hold what they promise.
 
 Readers compare what a header promises with the size of the file before they take memory, and with what they read before
 they return it. What unpacks or repeats itself has a budget, a multiple of the size.
@@ -70,7 +70,7 @@ def _damaged(path: Path, what: str, error: Exception) -> FileFormatError:
 
 
 def binary_rows(path: Path, start: int, row: np.dtype, n: int, block: int) -> Iterator[np.ndarray]:
-    """The n rows of a file from a place on, in structured arrays of so many; ValueError where it breaks off."""
+    """The n rows of a file from the byte `start` on, in structured arrays of `block` rows; ValueError if some lack."""
     with path.open("rb") as stream:
         stream.seek(start)
         for begin in range(0, n, block):

@@ -99,17 +99,17 @@ def finite_blocks(
 
     InvalidCloudError in the end if there are some, unless these are to be dropped.
     """
-    at = first = dropped = 0
+    n = first = dropped = 0
     for block in map(Scan.by_area, read_blocks(path, where=where, bare=True)):
         finite = finite_rows(block.positions)
         if not (dropped or finite.all()):
-            first = at + int(np.argmin(finite))
+            first = n + int(np.argmin(finite))
         dropped += len(finite) - int(finite.sum())
         if finite.any():
             yield block.positions if finite.all() else block.positions[finite]
-        at += len(block)
+        n += len(block)
     if dropped and not drop_invalid:
-        raise not_finite(dropped, at, first)
+        raise not_finite(dropped, n, first)
     return dropped
 
 

@@ -141,7 +141,7 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
     if len(triangles):
         primitive |= {"indices": array(triangles.reshape(-1), "<u4"), "mode": TRIANGLES_MODE}
     joints, places = _joints(forest, origin)
-    at_rest = np.tile(np.eye(4), (len(places), 1, 1))  # by columns
+    at_rest = np.tile(np.eye(4), (len(places), 1, 1))  # glTF has matrices by columns
     at_rest[:, 3, :3] = -places
     x, y, z = origin.tolist()
     armature = {

@@ -58,7 +58,7 @@ def _blocks(path: Path, start: int, row: np.dtype, points: int, binary: bool, ro
 
 @np.errstate(invalid="ignore")
 def _text_rows(path: Path, start: int, row: np.dtype, points: int, rows: int) -> Iterator[np.ndarray]:
-    """The same of text, as `binary_rows`."""
+    """The rows of text, as `binary_rows` gives those of binary data."""
     names = row.names or ()
     ends = np.cumsum([row[name].shape[0] for name in names])
     with path.open("rb") as stream:
@@ -84,33 +84,33 @@ def _compressed(path: Path) -> Scan:
         check_promised(packed, path.stat().st_size - stream.tell(), "compressed bytes")
         data = stream.read(packed)
     check_promised(points * row.itemsize, size, "bytes")
-    unpacked, columns, at = _unpacked(data, size), {}, 0
+    unpacked, columns, start = _unpacked(data, size), {}, 0
     for name in row.names or ():  # one after the other
         base, n = row[name].base, row[name].shape[0]
-        columns[name] = np.frombuffer(unpacked, base, points * n, at).reshape(points, n)
-        at += points * n * base.itemsize
+        columns[name] = np.frombuffer(unpacked, base, points * n, start).reshape(points, n)
+        start += points * n * base.itemsize
     return _scan(columns)
 
 
 def _unpacked(data: bytes, size: int) -> bytes:
     """What LZF has packed, of so many bytes: runs of bytes as they are, and copies of what came before."""
-    out, at = bytearray(), 0
-    while at < len(data) and len(out) < size:
-        control, at = data[at], at + 1
-        if control < 32:
-            out += data[at : at + control + 1]
-            at += control + 1
+    unpacked, position = bytearray(), 0
+    while position < len(data) and len(unpacked) < size:
+        control, position = data[position], position + 1
+        if control < 32:  # a run
+            unpacked += data[position : position + control + 1]
+            position += control + 1
             continue
-        length, back = (control >> 5) + 2, (control & 31) << 8
+        length, distance = (control >> 5) + 2, (control & 31) << 8
         if length == 9:
-            length, at = length + data[at], at + 1
-        start, at = len(out) - back - data[at] - 1, at + 1
+            length, position = length + data[position], position + 1
+        start, position = len(unpacked) - distance - data[position] - 1, position + 1
         if start < 0:
             raise ValueError("its compressed data are damaged")
-        copied = out[start : start + length]
-        out += (copied * (length // len(copied) + 1))[:length]  # it may overlap its copy
-    check_promised(size, len(out), "bytes")
-    return bytes(out)
+        copied = unpacked[start : start + length]
+        unpacked += (copied * (length // len(copied) + 1))[:length]  # it may overlap its copy
+    check_promised(size, len(unpacked), "bytes")
+    return bytes(unpacked)
 
 
 def _scan(fields: dict[str, np.ndarray]) -> Scan:
