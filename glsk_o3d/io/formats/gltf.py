@@ -89,7 +89,7 @@ def save_rig(
     if up not in UPRIGHT:
         raise InvalidParameterError(f"up = {up!r}: must be one of {', '.join(UPRIGHT)}")
     with holding_all(path):
-        bones = armature(_with_edges(as_forest(skeleton, cut_loops, root)))
+        bones = armature(as_forest(skeleton, cut_loops, root))
         data = _content(bones, _surface(skeleton) if mesh is None else mesh, up)
     write_atomically(path, lambda temporary: temporary.write_bytes(data))
     return bones
@@ -97,13 +97,7 @@ def save_rig(
 
 def write(forest: Skeleton) -> bytes:
     """The content of a GLB file: the tubes of a skeleton that is numbered from its roots outwards, and its armature."""
-    return _content(_with_edges(forest), _surface(forest), "z")
-
-
-def _with_edges(forest: Skeleton) -> Skeleton:
-    if len(forest.edges) == 0:
-        raise FileFormatError("the skeleton has no edges: there are no bones to make an armature of")
-    return forest
+    return _content(forest, _surface(forest), "z")
 
 
 def _surface(skeleton: Skeleton) -> Any:
@@ -116,6 +110,8 @@ def _surface(skeleton: Skeleton) -> Any:
 
 def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
     """The content of a GLB file."""
+    if len(forest.edges) == 0:
+        raise FileFormatError("the skeleton has no edges: there are no bones to make an armature of")
     if len(forest.edges) > MOST_JOINTS:
         raise FileFormatError(f"glTF counts at most {MOST_JOINTS} bones, not {len(forest.edges)}: simplify it first")
     mesh = mesh.to_legacy() if open3d_class(mesh) in (("PointCloud", True), ("TriangleMesh", True)) else mesh

@@ -242,8 +242,7 @@ def blocks(path: Path, rows: int, bare: bool) -> tuple[int | None, Iterator[Scan
     if not order or "vertex" not in filled or any(element.lists for element in filled.values()):
         return None, map(_whole, [path])
     check_elements(elements, path.stat().st_size - start)
-    before = takewhile(lambda element: element.name != "vertex", elements)
-    start += sum(element.least() for element in before)
+    start += sum(element.least() for element in takewhile(lambda element: element.name != "vertex", elements))
     vertex = filled["vertex"]
     return vertex.rows, _blocks(path, start, vertex.dtype(order), vertex.rows, rows, bare)
 

@@ -110,8 +110,8 @@ def _rows(stream: TextIO, layout: Layout, path: Path) -> np.ndarray:
     stream.seek(0)
     cells, skipped = array("d"), 0
     for line in islice(stream, layout.skip, None):
-        words = _cells(line.partition("#")[0], layout.delimiter)
-        if not any(map(str.strip, words)):
+        words = _split(line.partition("#")[0], layout.delimiter, quotes="")  # a number in quotes is none
+        if not any(words):
             continue
         row = [_number(words[i]) if i < len(words) else None for i in layout.columns]
         cut = not line.endswith("\n") and len(words) <= layout.columns[-1]  # its last number may have been longer
@@ -140,14 +140,10 @@ def _whole(values: np.ndarray) -> np.ndarray:
     return values.astype(np.int32) if whole else values
 
 
-def _cells(line: str, delimiter: str | None) -> list[str]:
-    """What is between delimiters; commas that are none are decimal points."""
-    return (line if delimiter == "," else line.replace(",", ".")).split(delimiter)
-
-
-def _split(line: str, delimiter: str | None) -> list[str]:
-    """The words of a line, without quotes."""
-    return [cell.strip().strip("\"'") for cell in _cells(line, delimiter)]
+def _split(line: str, delimiter: str | None, quotes: str = "\"'") -> list[str]:
+    """The words of a line, without quotes; commas that are no delimiters are decimal points."""
+    line = line if delimiter == "," else line.replace(",", ".")
+    return [word.strip().strip(quotes) for word in line.split(delimiter)]
 
 
 def _numeric(words: list[str]) -> list[int]:
