@@ -2,14 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
 from ..errors import InvalidParameterError
 from ..geometry.vectors import Floats
-
-Chain: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]  # nodes, edges, radii
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -44,6 +42,31 @@ class Sample:
         return f"Sample({self.name!r}, {counts})"
 
 
+class Axis:
+    """The axis of a sample: nodes, edges and radii, to which chains of nodes are added one by one."""
+
+    def __init__(self) -> None:
+        self.nodes, self.edges, self.radii = list[Any](), list[tuple[int, int]](), list[float]()
+
+    def grow(self, nodes: Any, radii: Any, start: int | None = None, end: int | None = None) -> int:
+        """Add a chain of nodes between two known ones, or free at either end; returns its last node."""
+        for node, radius in zip(nodes, np.broadcast_to(radii, len(nodes)), strict=True):
+            new = len(self.nodes)
+            if start is not None:
+                self.edges.append((start, new))
+            self.nodes.append(node)
+            self.radii.append(radius)
+            start = new
+        if end is not None:
+            self.edges.append((new, end))
+        return new
+
+    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Nodes, (M, 3) float64 array, edges, (E, 2) int64 array, and radii, (M,) float64 array."""
+        nodes, edges = np.array(self.nodes, float).reshape(-1, 3), np.array(self.edges, np.int64).reshape(-1, 2)
+        return nodes, edges, np.array(self.radii, float)
+
+
 def checked_generator(n: Any, noise: float, seed: Any, **positive: float) -> np.random.Generator:
     """The random numbers of a sample; InvalidParameterError for a wrong n, noise, or length or angle by its name."""
     if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
@@ -68,24 +91,15 @@ def collect(draw: Callable[[int], np.ndarray], n: int) -> np.ndarray:
 
 def noisy(points: Floats, noise: float, rng: np.random.Generator) -> np.ndarray:
     """The points with Gaussian noise, which is a share of the diagonal of their box."""
-    return (
-        points
-        if noise == 0
-        else points + rng.normal(scale=noise * np.linalg.norm(np.ptp(points, axis=0)), size=points.shape)
-    )
+    if noise == 0:
+        return points
+    return points + rng.normal(scale=noise * np.linalg.norm(np.ptp(points, axis=0)), size=points.shape)
 
 
 def directions(n: int, rng: np.random.Generator) -> np.ndarray:
     """Random unit vectors, (n, 3)."""
     v: Floats = rng.normal(size=(n, 3))
     return v / np.linalg.norm(v, axis=1, keepdims=True)
-
-
-def chain(nodes: Any, radius: float, closed: bool = False) -> Chain:
-    """Nodes, edges and radii of a tube through the nodes, and back to the first if it is closed."""
-    nodes = np.asarray(nodes, float)
-    start = np.arange(len(nodes) - (not closed))
-    return nodes, np.stack([start, (start + 1) % len(nodes)], axis=1), np.full(len(nodes), float(radius))
 
 
 def signed_distance(points: np.ndarray, nodes: np.ndarray, edges: np.ndarray, radii: np.ndarray) -> np.ndarray:

@@ -7,16 +7,16 @@ from scipy.spatial.distance import cdist
 
 from ..errors import InvalidParameterError
 from ..geometry.vectors import Floats
-from .capsules import Sample, checked_generator, directions, union_sample
+from .capsules import Axis, Sample, checked_generator, directions, union_sample
 
 TWO_CAMERAS = ((1.1, 1.8, 1.4), (-1.2, -1.7, 1.3))
 """Where the sauropod is scanned from: front left and rear right, a little above it."""
 
-PIECES = 6  # of which a limb is made
-TRIED = 40  # limbs drawn for each that grows
-SHORTER = 0.76  # a limb than the one before
-NARROWING = np.sqrt(0.5)  # end over beginning, so that the two limbs of a fork have the cross-section of one
-LEAN, BEND, UPWARDS = 0.7, 0.3, 0.2  # how far limbs turn aside at a fork, on their way, and towards the light
+LIMB_NODES = 6  # of each limb of a tree
+CANDIDATE_LIMBS = 40  # of which the one farthest from all others grows
+LENGTH_RATIO = 0.76  # of a limb to the one that it grows from
+TAPER = np.sqrt(0.5)  # end over beginning, so that the two limbs of a fork have the cross-section of one
+LEAN, BEND, UPWARDS = 0.7, 0.3, 0.2  # how far limbs turn aside at a fork, along their length, and towards the light
 
 
 def y_junction(
@@ -38,9 +38,11 @@ def y_junction(
     """
     checked_generator(n, noise, seed, stem=radii[0], left=radii[1], right=radii[2])
     sine, cosine = np.sin(np.deg2rad(40)), np.cos(np.deg2rad(40))
-    nodes = 0.5 * np.array([[0, 0, 0], [0, 0, -1], [-sine, 0, cosine], [sine, 0, cosine]])
-    edges = np.array([[0, 1], [0, 2], [0, 3]])
-    return union_sample("y_junction", nodes, edges, np.array([radii[0], *radii], float), n, noise, seed)
+    axis = Axis()
+    middle = axis.grow(np.zeros((1, 3)), radii[0])
+    for end, radius in zip(0.5 * np.array([[0, 0, -1], [-sine, 0, cosine], [sine, 0, cosine]]), radii, strict=True):
+        axis.grow([end], radius, middle)
+    return union_sample("y_junction", *axis.arrays(), n, noise, seed)
 
 
 def sauropod(
@@ -65,39 +67,25 @@ def sauropod(
     >>> sauropod(500)
     Sample('sauropod', 500 points, 54 nodes, 54 edges)
     """
-    nodes, edges, radii = list[Any](), list[Any](), []  # x forward, y to its left, z up; the feet stand on z = 0
-
-    def grow(places: Any, sizes: Any, start: int | None = None, end: int | None = None) -> int | None:
-        """A chain of new nodes from `start`, closed onto `end`; returns its last node."""
-        for place, size in zip(places, sizes, strict=True):
-            if start is not None:
-                edges.append((start, len(nodes)))
-            start = len(nodes)
-            nodes.append(place)
-            radii.append(size)
-        if end is not None:
-            edges.append((start, end))
-        return start
-
-    hip = grow([(-0.20, 0, 0.345)], [0.105])
-    rear = grow([(-0.11, 0, 0.362)], [0.122], hip)
-    front = grow([(0, 0, 0.37), (0.11, 0, 0.368)], [0.128, 0.122], rear)
-    chest = grow([(0.20, 0, 0.36)], [0.1], front)
+    axis = Axis()  # x forward, y to its left, z up; the feet stand on z = 0
+    hip = axis.grow([(-0.20, 0, 0.345)], 0.105)
+    rear = axis.grow([(-0.11, 0, 0.362)], 0.122, hip)
+    front = axis.grow([(0, 0, 0.37), (0.11, 0, 0.368)], [0.128, 0.122], rear)
+    chest = axis.grow([(0.20, 0, 0.36)], 0.1, front)
     neck = _curve([(0.20, 0, 0.36), (0.33, 0, 0.43), (0.395, 0, 0.57), (0.42, 0, 0.72), (0.47, 0, 0.80)], 8)
-    head = grow(neck, np.linspace(0.08, 0.042, len(neck)), chest)
-    grow([(0.525, 0, 0.803), (0.615, 0, 0.765)], [0.056, 0.04], head)
+    head = axis.grow(neck, np.linspace(0.08, 0.042, len(neck)), chest)
+    axis.grow([(0.525, 0, 0.803), (0.615, 0, 0.765)], [0.056, 0.04], head)
     near_hip = [(-0.20, 0, 0.345), (-0.36, 0, 0.29), (-0.50, 0.04, 0.195)]
     tail = _curve([*near_hip, (-0.64, 0.11, 0.17), (-0.75, 0.10, 0.25), (-0.80, 0, 0.35)], 14)
-    grow(tail, np.linspace(0.084, 0.028, len(tail)), hip)
+    axis.grow(tail, np.linspace(0.084, 0.028, len(tail)), hip)
     for root, x, sway in ((chest, 0.20, 0.025), (hip, -0.21, -0.025)):
         for side in (1, -1):
             leg = [(x, 0.105 * side, 0.25), (x + sway, 0.125 * side, 0.14), (x + sway * 0.4, 0.13 * side, 0.046)]
-            grow(leg, [0.062, 0.05, 0.046], root)
+            axis.grow(leg, [0.062, 0.05, 0.046], root)
     arch = np.linspace(np.pi, 0, 15)[1:-1]
     handle = np.stack([0.14 * np.cos(arch), 0 * arch, 0.46 + 0.27 * np.sin(arch) ** 0.8], axis=1)
-    grow(handle, np.full(len(handle), 0.03), rear, end=front)
-    axis = np.array(nodes), np.array(edges, np.int64), np.array(radii)
-    return union_sample("sauropod", *axis, n, noise, seed, cameras)
+    axis.grow(handle, 0.03, rear, end=front)
+    return union_sample("sauropod", *axis.arrays(), n, noise, seed, cameras)
 
 
 def _curve(through: Any, pieces: int) -> Any:
@@ -145,27 +133,26 @@ def tree(
     rng = checked_generator(n, noise, [seed, 1], length=length, radius=radius)
     if isinstance(forks, bool) or not isinstance(forks, int | np.integer) or not 0 <= forks <= 8:
         raise InvalidParameterError(f"forks = {forks!r}: must be an int from 0 to 8")
-    nodes, edges, radii = np.zeros((1, 3)), [], np.array([radius])
-    tips = [(0, np.array([0.0, 0.0, 1.0]))]
+    axis = Axis()
+    tips = [(axis.grow(np.zeros((1, 3)), radius), np.array([0.0, 0.0, 1.0]))]
     for order in range(forks + 1):
-        grown = []
-        for root, heading in [tip for tip in tips for _ in range(2 if order else 1)]:
-            drawn = nodes[root] + length * SHORTER**order * _limbs(heading, LEAN if order else 0.0, rng)
-            clear = [(cdist(limb[1:], nodes) - radii).min() for limb in drawn]
-            limb, first = drawn[np.argmax(clear)], len(nodes)  # the one farthest from all others grows
-            edges += [(root, first), *((at, at + 1) for at in range(first, first + PIECES - 1))]
-            nodes = np.concatenate([nodes, limb])
-            radii = np.append(radii, np.linspace(radii[root], radii[root] * NARROWING, PIECES + 1)[1:])
-            grown.append((len(nodes) - 1, limb[-1] - limb[-2]))
-        tips = grown
-    return union_sample("tree", nodes, np.array(edges, np.int64), radii, n, noise, seed, cameras)
+        forked = tips if order == 0 else [tip for tip in tips for _ in range(2)]
+        tips = []
+        for root, heading in forked:
+            nodes, _, radii = axis.arrays()
+            candidates = nodes[root] + length * LENGTH_RATIO**order * _limbs(heading, LEAN if order else 0.0, rng)
+            gaps = [(cdist(limb[1:], nodes) - radii).min() for limb in candidates]
+            limb = candidates[np.argmax(gaps)]
+            tip = axis.grow(limb, np.linspace(radii[root], radii[root] * TAPER, LIMB_NODES + 1)[1:], root)
+            tips.append((tip, limb[-1] - limb[-2]))
+    return union_sample("tree", *axis.arrays(), n, noise, seed, cameras)
 
 
 def _limbs(heading: np.ndarray, lean: float, rng: np.random.Generator) -> np.ndarray:
-    """Limbs of unit length, (TRIED, PIECES, 3), that leave the origin, lean aside, and bend up a little."""
-    start = directions(TRIED, rng) * lean + heading / np.linalg.norm(heading)
-    bend = directions(TRIED, rng) * BEND + [0, 0, UPWARDS * (lean > 0)]
-    along = np.linspace(0, 1, PIECES)[:, None, None]
+    """Candidate limbs of unit length, (c, LIMB_NODES, 3), that leave the origin, lean aside, and bend up a little."""
+    start = directions(CANDIDATE_LIMBS, rng) * lean + heading / np.linalg.norm(heading)
+    bend = directions(CANDIDATE_LIMBS, rng) * BEND + [0, 0, UPWARDS * (lean > 0)]
+    along = np.linspace(0, 1, LIMB_NODES)[:, None, None]
     steps: Floats = start + along * bend
     steps /= np.linalg.norm(steps, axis=2, keepdims=True)
-    return np.cumsum(steps, axis=0).swapaxes(0, 1) / PIECES
+    return np.cumsum(steps, axis=0).swapaxes(0, 1) / LIMB_NODES

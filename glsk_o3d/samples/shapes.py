@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InvalidParameterError
 from ..geometry.vectors import Floats
-from .capsules import Chain, Sample, chain, checked_generator, collect, directions, noisy, union_sample
+from .capsules import Axis, Sample, checked_generator, collect, directions, noisy, union_sample
 
 
 def tube(
@@ -32,12 +32,13 @@ def tube(
     Sample('tube', 500 points, 2 nodes, 1 edges)
     """
     rng = checked_generator(n, noise, seed, length=length, radius=radius)
-    axis = chain([[-length / 2, 0, 0], [length / 2, 0, 0]], radius)
+    axis = Axis()
+    axis.grow([(-length / 2, 0, 0), (length / 2, 0, 0)], radius)
     if capped:
-        return union_sample("tube", *axis, n, noise, seed)
+        return union_sample("tube", *axis.arrays(), n, noise, seed)
     angle = rng.uniform(0, 2 * np.pi, n)
     points = np.stack([rng.uniform(-length / 2, length / 2, n), radius * np.cos(angle), radius * np.sin(angle)], axis=1)
-    return Sample(noisy(points, noise, rng), *axis, "tube")
+    return Sample(noisy(points, noise, rng), *axis.arrays(), "tube")
 
 
 def helix(n: int = 4096, *, noise: float = 0.0, seed: int = 0) -> Sample:
@@ -81,9 +82,9 @@ def helix(n: int = 4096, *, noise: float = 0.0, seed: int = 0) -> Sample:
         density = np.where(which == 0, 1 - radius * curvature * np.cos(angle), 1)  # area element of a bent tube
         return points[rng.uniform(0, 1 + radius * curvature, m) < density]
 
-    points = collect(draw, n)
-    axis = chain(frame(np.linspace(0, end, 193))[0], radius)
-    return Sample(noisy(points, noise, rng), *axis, "helix")
+    axis = Axis()
+    axis.grow(frame(np.linspace(0, end, 193))[0], radius)
+    return Sample(noisy(collect(draw, n), noise, rng), *axis.arrays(), "helix")
 
 
 def torus(n: int = 4096, *, ring_radius: float = 0.4, radius: float = 0.1, noise: float = 0.0, seed: int = 0) -> Sample:
@@ -104,8 +105,10 @@ def torus(n: int = 4096, *, ring_radius: float = 0.4, radius: float = 0.1, noise
     rng = checked_generator(n, noise, seed, ring_radius=ring_radius, radius=radius)
     if radius >= ring_radius:
         raise InvalidParameterError(f"radius = {radius}: must be below ring_radius = {ring_radius}")
-    points, (nodes, edges, radii) = _ring(n, ring_radius, radius, rng)
-    return Sample(noisy(points, noise, rng), nodes, edges, radii, "torus")
+    points, circle = _ring(n, ring_radius, radius, rng)
+    axis = Axis()
+    axis.grow(circle, radius, end=0)
+    return Sample(noisy(points, noise, rng), *axis.arrays(), "torus")
 
 
 def two_rings(n: int = 4096, *, noise: float = 0.0, seed: int = 0) -> Sample:
@@ -122,18 +125,20 @@ def two_rings(n: int = 4096, *, noise: float = 0.0, seed: int = 0) -> Sample:
     Sample('two_rings', 500 points, 256 nodes, 256 edges)
     """
     rng = checked_generator(n, noise, seed)
-    points, (nodes, edges, radii) = _ring(n, 0.3, 0.06, rng)
+    points, circle = _ring(n, 0.3, 0.06, rng)
 
     def second(x: Floats) -> Floats:  # turned about x, and moved so that it goes through the middle of the first
         return np.stack([x[:, 0] + 0.3, -x[:, 2], x[:, 1]], axis=1)
 
     points = np.where(rng.random(n)[:, None] < 0.5, points, second(points))
-    nodes, edges = np.concatenate([nodes, second(nodes)]), np.concatenate([edges, edges + len(nodes)])
-    return Sample(noisy(points, noise, rng), nodes, edges, np.concatenate([radii, radii]), "two_rings")
+    axis = Axis()
+    axis.grow(circle, 0.06, end=0)
+    axis.grow(second(circle), 0.06, end=len(circle))
+    return Sample(noisy(points, noise, rng), *axis.arrays(), "two_rings")
 
 
-def _ring(n: int, ring_radius: float, radius: float, rng: np.random.Generator) -> tuple[np.ndarray, Chain]:
-    """Points of a torus around z, and nodes, edges and radii of its axis, in 128 pieces."""
+def _ring(n: int, ring_radius: float, radius: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Points of a torus around z, (n, 3), and nodes of its axis, (128, 3)."""
 
     def draw(m: int) -> Any:
         around, tube_angle = rng.uniform(0, 2 * np.pi, (2, m))
@@ -143,7 +148,7 @@ def _ring(n: int, ring_radius: float, radius: float, rng: np.random.Generator) -
 
     angle = np.arange(128) * 2 * np.pi / 128
     circle = ring_radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    return collect(draw, n), chain(circle, radius, closed=True)
+    return collect(draw, n), circle
 
 
 def sphere(n: int = 4096, *, noise: float = 0.0, seed: int = 0) -> Sample:
@@ -161,7 +166,9 @@ def sphere(n: int = 4096, *, noise: float = 0.0, seed: int = 0) -> Sample:
     """
     rng = checked_generator(n, noise, seed)
     points = 0.5 * directions(n, rng)
-    return Sample(noisy(points, noise, rng), *chain(np.zeros((1, 3)), 0.5), "sphere")
+    axis = Axis()
+    axis.grow(np.zeros((1, 3)), 0.5)
+    return Sample(noisy(points, noise, rng), *axis.arrays(), "sphere")
 
 
 def sheet(n: int = 4096, *, bend: float = 60.0, noise: float = 0.0, seed: int = 0) -> Sample:
@@ -188,4 +195,4 @@ def sheet(n: int = 4096, *, bend: float = 60.0, noise: float = 0.0, seed: int = 
         curvature = np.deg2rad(bend)
         turn = curvature * along
         points = np.stack([np.sin(turn) / curvature, across, (np.cos(turn) - 1) / curvature], axis=1)
-    return Sample(noisy(points, noise, rng), *chain(np.zeros((0, 3)), 0), "sheet")
+    return Sample(noisy(points, noise, rng), *Axis().arrays(), "sheet")
