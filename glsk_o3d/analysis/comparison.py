@@ -20,7 +20,7 @@ TIP_REACH = 2.5
 JUNCTION_REACH = 2.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Truth:
     """A known axis: a graph of straight edges with the distance to the surface at its nodes.
 
@@ -45,17 +45,15 @@ class Truth:
 
     def __post_init__(self) -> None:
         try:
-            nodes = np.asarray(self.nodes, float).reshape(-1, 3)
-            radii = np.asarray(self.radii, float).reshape(-1)
+            self.nodes = np.asarray(self.nodes, float).reshape(-1, 3)
+            self.radii = np.asarray(self.radii, float).reshape(-1)
         except (TypeError, ValueError) as error:
             raise InvalidParameterError(f"the truth has invalid nodes or radii: {error}") from None
-        if len(nodes) == 0:
+        if len(self.nodes) == 0:
             raise InvalidParameterError("the truth has no nodes: there is no axis to compare with")
-        if len(radii) != len(nodes) or not (np.isfinite(radii) & (radii > 0)).all():
+        if len(self.radii) != len(self.nodes) or not (np.isfinite(self.radii) & (self.radii > 0)).all():
             raise InvalidParameterError("the truth must have a positive, finite radius at each of its nodes")
-        edges = check_graph(nodes, self.edges, "truth")
-        for name, array in (("nodes", nodes), ("edges", edges), ("radii", radii)):
-            object.__setattr__(self, name, array)
+        self.edges = check_graph(self.nodes, self.edges, "truth")
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from ..geometry.polylines import arc_lengths
 from ..parameters import check_number
 from .curves import check_places
 from .grasp_checks import Approaches, check_approaches, checked_plane
-from .gripper import GraspCandidates, Gripper, listed
+from .gripper import GraspCandidates, Gripper, in_words
 
 UNLIKELY_OPENING = 20.0  # derived: openings over diagonals: above those of hands and screws, below those of mm and m
 
@@ -126,7 +126,7 @@ def grasp_candidates(
         left_out=left_out | approaches_left_out,
     )
     if len(candidates) == 0:
-        why = listed(candidates.left_out) or "the skeleton has no branch"
+        why = in_words(candidates.left_out) or "the skeleton has no branch"
         warnings.warn(f"no grasp at {examined} places: {why}", SkeletonWarning, stacklevel=outside())
     return candidates
 

@@ -24,7 +24,7 @@ PALM_PER_OPENING = (180 / 80, 80 / 80, 58.4 / 80)
 REACH_PER_OPENING = 9.5 / 80
 
 
-@dataclass(frozen=True)
+@dataclass
 class Gripper:
     """A gripper with two parallel jaws, as boxes. Lengths are in the cloud's units.
 
@@ -57,13 +57,11 @@ class Gripper:
     reach: Any = None
 
     def __post_init__(self) -> None:
-        opening = check_number("max_opening", self.max_opening, low=0, open_low=True)
-        finger = _sides("finger", self.finger, FINGER_PER_OPENING, opening)
-        reach = opening * REACH_PER_OPENING if self.reach is None else self.reach
-        object.__setattr__(self, "max_opening", opening)
-        object.__setattr__(self, "finger", finger)
-        object.__setattr__(self, "palm", _sides("palm", self.palm, PALM_PER_OPENING, opening))
-        object.__setattr__(self, "reach", check_number("reach", reach, low=0, high=finger[2]))
+        self.max_opening = check_number("max_opening", self.max_opening, low=0, open_low=True)
+        self.finger = _sides("finger", self.finger, FINGER_PER_OPENING, self.max_opening)
+        self.palm = _sides("palm", self.palm, PALM_PER_OPENING, self.max_opening)
+        reach = self.max_opening * REACH_PER_OPENING if self.reach is None else self.reach
+        self.reach = check_number("reach", reach, low=0, high=self.finger[2])
 
     def boxes(self, opening: Any, depth: Any) -> tuple[np.ndarray, np.ndarray]:
         """The two fingers and the palm, in the frame of the gripper: x closing, y along the part, z approach.
@@ -77,8 +75,8 @@ class Gripper:
         extent, across, deep = self.palm
         low = [[-thickness, -width / 2, -length], [0, -width / 2, -length], [-extent / 2, -across / 2, -length - deep]]
         high = [[0, width / 2, 0], [thickness, width / 2, 0], [extent / 2, across / 2, -length]]
-        moved = inner * [[-1.0, 0, 0], [1, 0, 0], [0, 0, 0]] + tip * [0.0, 0, 1]
-        return low + moved, high + moved
+        shift = inner * [[-1.0, 0, 0], [1, 0, 0], [0, 0, 0]] + tip * [0.0, 0, 1]
+        return low + shift, high + shift
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,12 +124,12 @@ class GraspCandidates(Rows, row="grasp"):
 
     def __getitem__(self, rows: Any) -> GraspCandidates:
         rows = np.atleast_1d(np.arange(len(self))[rows])
-        arrays = {name: value[rows] for name, value in vars(self).items() if isinstance(value, np.ndarray)}
-        return replace(self, **arrays)
+        selected: dict[str, Any] = {name: array[rows] for name, array in self._arrays().items()}
+        return replace(self, **selected)
 
     def __repr__(self) -> str:
-        missed = f"; not taken: {listed(self.left_out)}" if self.left_out else ""
-        return f"GraspCandidates({len(self)} at {self.places} places{missed})"
+        rejected = f"; not taken: {in_words(self.left_out)}" if self.left_out else ""
+        return f"GraspCandidates({len(self)} at {self.places} places{rejected})"
 
     @property
     def axis(self) -> np.ndarray:
@@ -158,10 +156,8 @@ class GraspCandidates(Rows, row="grasp"):
         fork = [side + tip, side + base, -side + base, -side + tip, base, base - hand.palm[2] * self.approach]
         ends = (self.position + np.array(fork)).transpose(1, 0, 2).reshape(-1, 3)
         lines = np.array([[0, 1], [1, 2], [2, 3], [4, 5]]) + len(fork) * np.arange(len(self))[:, None, None]
-        drawn = o3d.geometry.LineSet()
-        drawn.points = o3d.utility.Vector3dVector(ends)
-        drawn.lines = o3d.utility.Vector2iVector(lines.reshape(-1, 2).astype(np.int32))
-        return drawn
+        lines = o3d.utility.Vector2iVector(lines.reshape(-1, 2).astype(np.int32))
+        return o3d.geometry.LineSet(o3d.utility.Vector3dVector(ends), lines)
 
     def to_json(self, path: str | os.PathLike[str]) -> None:
         """Write candidates, poses, gripper and `left_out`; an unknown confidence is null."""
@@ -169,7 +165,7 @@ class GraspCandidates(Rows, row="grasp"):
 
     def as_dict(self) -> dict[str, Any]:
         """What `to_json` writes: plain numbers, lists and dicts."""
-        columns = {name: value.tolist() for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        columns = {name: array.tolist() for name, array in self._arrays().items()}
         columns["confidence"] = [None if math.isnan(value) else value for value in columns["confidence"]]
         columns["pose"] = self.poses.tolist()
         return {
@@ -181,16 +177,16 @@ class GraspCandidates(Rows, row="grasp"):
         }
 
 
-def listed(left_out: Mapping[str, int]) -> str:
-    """How many places and ways in were left out, and why."""
+def in_words(left_out: Mapping[str, int]) -> str:
+    """Numbers of rejected places and approaches, each with its reason."""
     return ", ".join(f"{count} {reason}" for reason, count in left_out.items())
 
 
-def _sides(name: str, given: Any, ratios: tuple[float, ...], opening: float) -> tuple[float, ...]:
+def _sides(name: str, lengths: Any, ratios: tuple[float, ...], opening: float) -> tuple[float, ...]:
     """The sides of a box, by default in proportion to the opening."""
-    if given is None:
+    if lengths is None:
         return tuple(opening * ratio for ratio in ratios)
-    sides = tuple(given) if isinstance(given, Iterable) else ()
+    sides = tuple(lengths) if isinstance(lengths, Iterable) else ()
     if len(sides) != 3:
-        raise InvalidParameterError(f"{name} = {given!r}: must be three lengths")
+        raise InvalidParameterError(f"{name} = {lengths!r}: must be three lengths")
     return tuple(check_number(f"a side of {name}", side, low=0, open_low=True) for side in sides)

@@ -27,15 +27,18 @@ class Rows:
         cls._row = row
 
     def __len__(self) -> int:
-        return len(getattr(self, fields(self)[0].name))  # type: ignore[arg-type]
+        return len(next(iter(self._arrays().values())))
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        """The fields that are arrays."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
+        return {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
 
     def _columns(self) -> dict[str, list[Any]]:
         columns: dict[str, list[Any]] = {self._row: list(range(len(self)))}
-        for field in fields(self):  # type: ignore[arg-type]
-            array = getattr(self, field.name)
-            if isinstance(array, np.ndarray):
-                names = [field.name] if array.ndim == 1 else [f"{field.name}_{axis}" for axis in "xyz"]
-                columns |= zip(names, np.atleast_2d(array.T).tolist(), strict=True)
+        for name, array in self._arrays().items():
+            names = [name] if array.ndim == 1 else [f"{name}_{axis}" for axis in "xyz"]
+            columns |= zip(names, np.atleast_2d(array.T).tolist(), strict=True)
         return columns
 
     def __iter__(self) -> Iterator[dict[str, Any]]:

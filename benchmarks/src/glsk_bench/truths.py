@@ -16,7 +16,7 @@ THING_ARRAYS = ("half_width", "flat", "judged", "mirror")
 """What the true axis of a thing has besides `nodes`, `edges` and `radii`."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class ThingTruth(Truth):
     """The true axis of a thing, whose sections need not be circles and whose ends need not be round.
 
@@ -56,25 +56,24 @@ class ThingTruth(Truth):
     def __post_init__(self) -> None:
         super().__post_init__()
         try:
-            width = np.asarray(self.half_width, float)
-            mirror = np.asarray(self.mirror, float).reshape(-1, 3)
+            self.half_width = np.asarray(self.half_width, float)
+            self.mirror = np.asarray(self.mirror, float).reshape(-1, 3)
         except (TypeError, ValueError) as error:
             raise InvalidParameterError(f"the truth has an invalid half_width or mirror: {error}") from None
-        judged, flat = np.asarray(self.judged), np.asarray(self.flat)
+        width, mirror = self.half_width, self.mirror
+        self.judged, flat = np.asarray(self.judged), np.asarray(self.flat)
         flat = flat if flat.size else np.empty(0, np.int64)
         if width.shape != self.radii.shape or not (np.isfinite(width) & (width > 0)).all():
             raise InvalidParameterError("the truth must have a positive, finite half_width at each of its nodes")
         if flat.ndim != 1 or flat.dtype.kind not in "iu" or not np.isin(flat, np.arange(len(width))).all():
             raise InvalidParameterError("the flat ends of the truth must be some of its nodes, by number")
-        if judged.shape != (len(self.edges),) or judged.dtype != bool:
+        if self.judged.shape != (len(self.edges),) or self.judged.dtype != bool:
             raise InvalidParameterError("judged must be true or false for each edge of the truth")
         if len(mirror) not in (0, 2) or not np.isfinite(mirror).all():
             raise InvalidParameterError("the mirror of the truth must be a point and a normal, or nothing")
         if len(mirror) and not np.isclose(np.linalg.norm(mirror[1]), 1):
             raise InvalidParameterError(f"the normal of the truth's mirror must have length 1: {mirror[1].tolist()}")
-        arrays = {"half_width": width, "flat": flat.astype(np.int64), "judged": judged, "mirror": mirror}
-        for name, array in arrays.items():
-            object.__setattr__(self, name, array)
+        self.flat = flat.astype(np.int64)
 
 
 def read_axis(path: Path) -> Truth:
