@@ -1,4 +1,4 @@
-"""Ways in of a gripper beside walls, through handles, over planes, in noise and in gaps: where the answer is known."""
+"""Approaches of a gripper beside walls, through handles, over planes, in noise and in gaps, with known answers."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from glsk_o3d import InvalidCloudError, InvalidParameterError, Skeleton, SkeletonWarning, samples
-from glsk_o3d.analysis import Gripper, grasp_candidates, grasp_checks
+from glsk_o3d.analysis import Gripper, grasp_candidates
 
 HAND = Gripper(0.4, finger=(0.05, 0.06, 0.3), palm=(0.5, 0.1, 0.2), reach=0.05)
 CLEARANCE = 0.02
@@ -22,7 +22,7 @@ def rod(extra=(), n=4000):
 
 
 def sheet(x, y, z, step=0.01):
-    """Points on a grid between these limits; a number is a limit that is not left."""
+    """Points on a grid: each coordinate is between two limits, or one number."""
     axes = [np.arange(*side, step) if isinstance(side, tuple) else [side] for side in (x, y, z)]
     return np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 3)
 
@@ -31,15 +31,12 @@ def grasp(skeleton, **options):
     return grasp_candidates(skeleton, HAND, **{"clearance": CLEARANCE, **options})
 
 
-def same(some, others):
-    assert some.left_out == others.left_out
+def check_same(grasps, others):
+    """The same approaches in any order, as `left_out` numbers."""
+    assert grasps.left_out == others.left_out
+    rows, other_rows = (np.lexsort((*it.approach.round(6).T, *it.position.round(6).T)) for it in (grasps, others))
     for name in ("position", "approach", "closing", "opening", "depth", "quality", "seen"):
-        np.testing.assert_allclose(getattr(some, name), getattr(others, name), atol=1e-9)
-
-
-def by_place(grasps):
-    """The same ones in an order of their own."""
-    return grasps[np.lexsort((*grasps.approach.round(6).T, *grasps.position.round(6).T))]
+        np.testing.assert_allclose(getattr(grasps, name)[rows], getattr(others, name)[other_rows], atol=1e-9)
 
 
 WALL = sheet((-1, 1), 0.3, (-1.5, 1.5), 0.02)
@@ -48,12 +45,12 @@ WALL = sheet((-1, 1), 0.3, (-1.5, 1.5), 0.02)
 @pytest.mark.parametrize(
     ("points", "plane", "why"), [((), (0, 1, 0, -0.3), BEHIND), ((), (0, -10, 0, 3.0), BEHIND), (WALL, None, TOUCHING)]
 )
-def test_a_wall_keeps_away_exactly_what_comes_from_its_side(points, plane, why):
+def test_a_wall_blocks_exactly_the_approaches_from_its_side(points, plane, why):
     free, beside = grasp(rod()), grasp(rod(points), plane=plane)
     assert len(free) == 8 * free.places
     assert beside.left_out == {why: 3 * free.places}
     kept = free.approach[:, 1] > -1e-9
-    same(replace(free[kept], left_out=beside.left_out), beside)
+    check_same(replace(free[kept], left_out=beside.left_out), beside)
     np.testing.assert_allclose(beside.opening, 0.2 + CLEARANCE)
     assert (beside.seen == 3).all()
 
@@ -72,16 +69,15 @@ def test_a_finger_goes_through_a_handle_that_is_wider_than_it(gap, sides):
     assert handle.approach[:, 2].max() < 1e-9  # none from below
 
 
-def test_a_palm_stops_at_what_is_as_far_as_the_fingers_are_long():
+@pytest.mark.parametrize(("step", "count"), [(-1e-3, 9), (1e-3, 0)])
+@pytest.mark.filterwarnings("ignore:no grasp")
+def test_a_palm_stops_at_what_is_as_far_as_the_fingers_are_long(step, count):
     """A ridge on the rod, between the fingers."""
-    front = 0.3 - 0.05 - CLEARANCE / 2
-    low, high = (rod(sheet((-0.6, 0.6), (-0.05, 0.05), front + step)) for step in (-1e-3, 1e-3))
-    assert len(grasp(low, around=1)) == 9
-    with pytest.warns(SkeletonWarning, match=f"9 {TOUCHING}"):
-        assert len(grasp(high, around=1)) == 0
+    ridge = sheet((-0.6, 0.6), (-0.05, 0.05), 0.3 - 0.05 - CLEARANCE / 2 + step)
+    assert len(grasp(rod(ridge), around=1)) == count
 
 
-def test_a_way_in_is_as_long_as_the_object():
+def test_an_approach_is_as_long_as_the_object():
     skeleton = rod()
     diagonal = np.linalg.norm(np.ptp(skeleton.points, axis=0))
     back = 0.05 - 0.3 - 0.2 - diagonal - CLEARANCE / 2  # where the palm comes from
@@ -99,45 +95,40 @@ def test_turned_moved_scaled_and_shuffled():
         return scale * turn.apply(points) + shift
 
     points = moved(rng.permutation(plain.points))
-    there = replace(plain, vertices=moved(plain.vertices), radii=scale * plain.radii, points=points)
-    found = grasp_candidates(plain, 0.2, plane=(0, 1, 0, -0.25), around=4, spacing=0.1)
+    image = replace(plain, vertices=moved(plain.vertices), radii=scale * plain.radii, points=points)
+    grasps = grasp_candidates(plain, 0.2, plane=(0, 1, 0, -0.25), around=4, spacing=0.1)
     side = turn.apply([0, 1, 0])
     plane = (*side, -0.25 * scale - side @ shift)
-    again = grasp_candidates(there, 0.2 * scale, plane=plane, around=4, spacing=0.1 * scale)
-    assert len(found) > 15
-    assert len(found.left_out) >= 3
-    assert found.left_out == again.left_out
-    np.testing.assert_array_equal(found.seen, again.seen)
-    np.testing.assert_allclose(again.position, moved(found.position), atol=1e-8)
-    np.testing.assert_allclose(again.opening, scale * found.opening)
-    np.testing.assert_allclose(again.depth, scale * found.depth)
-    np.testing.assert_allclose(again.approach, turn.apply(found.approach), atol=1e-9)
+    images = grasp_candidates(image, 0.2 * scale, plane=plane, around=4, spacing=0.1 * scale)
+    assert len(grasps) > 15
+    assert len(grasps.left_out) >= 3
+    assert grasps.left_out == images.left_out
+    np.testing.assert_array_equal(grasps.seen, images.seen)
+    np.testing.assert_allclose(images.position, moved(grasps.position), atol=1e-8)
+    np.testing.assert_allclose(images.opening, scale * grasps.opening)
+    np.testing.assert_allclose(images.depth, scale * grasps.depth)
+    np.testing.assert_allclose(images.approach, turn.apply(grasps.approach), atol=1e-9)
 
 
 def test_points_between_the_jaws_and_those_that_are_not_finite_are_no_obstacle():
     inside = np.random.default_rng(0).uniform(-1, 1, (500, 3)) * [0.5, 0.06, 0.06]
-    same(grasp(rod()), grasp(rod([*inside, [np.nan, 0, 0], [0, np.inf, 0]])))
+    check_same(grasp(rod()), grasp(rod([*inside, [np.nan, 0, 0], [0, np.inf, 0]])))
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_no_finger_slips_between_the_points_of_a_sparse_thin_wall(seed, monkeypatch):
+def test_no_finger_slips_between_the_points_of_a_sparse_thin_wall(seed):
     """Points scattered over a wall, 1.2 thicknesses of a finger apart: it is hit, though often no point is."""
     rng, size = np.random.default_rng(seed), np.array([1.6, 1.6])
     n = int(size.prod() / (1.2 * HAND.finger[0]) ** 2)
     wall = np.insert((rng.random((n, 2)) - 0.5) * size, 2, 0.2, axis=1)
-    walled, options = rod(wall), dict(around=1, spacing=0.02, clearance=0.0)
     with pytest.warns(SkeletonWarning, match=TOUCHING):
-        assert len(grasp(walled, **options)) == 0
-    monkeypatch.setattr(grasp_checks, "cells", lambda points, close: points[:, None])
-    assert len(grasp(walled, **options)) > 0
+        assert len(grasp(rod(wall), around=1, spacing=0.02, clearance=0.0)) == 0
 
 
 def test_a_sparse_object_is_not_made_thicker():
-    sparse = rod(n=150)
-    assert grasp_checks.cells(sparse.points, 0.025).shape[1] > 1
-    found = grasp(sparse)
-    assert len(found) == 8 * found.places
-    np.testing.assert_allclose(found.opening, 0.2 + CLEARANCE)
+    grasps = grasp(rod(n=150))
+    assert len(grasps) == 8 * grasps.places
+    np.testing.assert_allclose(grasps.opening, 0.2 + CLEARANCE)
 
 
 def test_the_jaws_close_on_something():
@@ -145,7 +136,7 @@ def test_the_jaws_close_on_something():
         assert len(grasp(rod(), cloud=rod().points + [0, 0, 30])) == 0
 
 
-def test_what_was_seen_is_told_and_ranks():
+def test_sides_with_points_are_counted_and_rank():
     whole = rod()
     seen = whole.points[:, 1] > 0.01
     owner, normals = whole.vertex_of_point[seen], whole.normals[seen]
@@ -160,28 +151,26 @@ def test_what_was_seen_is_told_and_ranks():
 def test_the_best_of_each_place_comes_before_the_second_best_of_any():
     sample = samples.sauropod(4000)
     half = sample.points[sample.points[:, 1] > -0.02]  # qualities differ also around a place
-    sure = np.linspace(0.6, 1, len(sample.radii))
-    found = grasp_candidates(Skeleton(sample.nodes, sample.edges, sample.radii, (), half, (), confidence=sure), 0.2)
-    place = np.unique(found.position, axis=0, return_inverse=True)[1].reshape(-1)
+    confidence = np.linspace(0.6, 1, len(sample.radii))
+    skeleton = Skeleton(sample.nodes, sample.edges, sample.radii, (), half, (), confidence=confidence)
+    grasps = grasp_candidates(skeleton, 0.2)
+    place = np.unique(grasps.position, axis=0, return_inverse=True)[1].reshape(-1)
     rank = np.array([np.sum(place[:row] == place[row]) for row in range(len(place))])
     assert place.max() > 20
-    assert len(set(found[rank == 0].seen)) > 1
+    assert len(set(grasps[rank == 0].seen)) > 1
     assert (np.diff(rank) >= 0).all()
     for group in (rank, place):  # the best of a round comes first, and the best of a place
         for number in np.unique(group):
-            assert (np.diff(found.quality[group == number].round(9)) <= 0).all()
+            assert (np.diff(grasps.quality[group == number].round(9)) <= 0).all()
 
 
-def test_jaws_open_wider_where_points_scatter(monkeypatch):
+def test_jaws_open_wider_where_points_scatter():
     noisy = rod()
     noisy = replace(noisy, points=noisy.points + np.random.default_rng(0).normal(scale=0.006, size=noisy.points.shape))
-    found = grasp(noisy)
-    times = ((found.opening - 0.2) / CLEARANCE).round(6)
-    assert len(found) == 72
+    grasps = grasp(noisy)
+    times = ((grasps.opening - 0.2) / CLEARANCE).round(6)
+    assert len(grasps) == 72
     assert {2} < set(times) <= {1, 2, 3}
-    monkeypatch.setattr(grasp_checks, "WIDER", (1,))
-    narrow = grasp(noisy)
-    same(replace(by_place(found[times == 1]), left_out=narrow.left_out), by_place(narrow))
 
 
 def test_fingers_reach_as_far_as_the_part_and_no_farther_than_they_can():
@@ -191,25 +180,19 @@ def test_fingers_reach_as_far_as_the_part_and_no_farther_than_they_can():
     np.testing.assert_allclose(grasp(rod()).depth, HAND.reach)
 
 
-@pytest.mark.parametrize(
-    ("options", "error", "said"),
-    [
-        (dict(plane=(0, 0, 0, 1)), InvalidParameterError, "must be finite a, b, c, d"),
-        (dict(plane=(0, 0, np.nan, 1)), InvalidParameterError, "must be finite a, b, c, d"),
-        (dict(plane=(0, 0, 1)), InvalidParameterError, r"plane = \(0, 0, 1\): must be finite a, b, c, d"),
-        (dict(cloud=np.empty((0, 3))), InvalidCloudError, "empty"),
-    ],
-)
-def test_what_is_refused(options, error, said):
-    with pytest.raises(error, match=said):
-        grasp(rod(), **options)
+@pytest.mark.parametrize("plane", [(0, 0, 0, 1), (0, 0, np.nan, 1), (0, 0, 1), "table"])
+def test_impossible_planes_and_empty_clouds_are_refused(plane):
+    with pytest.raises(InvalidParameterError, match="plane"):
+        grasp(rod(), plane=plane)
+    with pytest.raises(InvalidCloudError, match="empty"):
+        grasp(rod(), cloud=np.empty((0, 3)))
 
 
 def test_a_skeleton_without_points_asks_for_them():
     bare = replace(rod(), points=(), vertex_of_point=(), normals=())
     with pytest.raises(InvalidParameterError, match=r"cloud=\(\)"):
         grasp(bare)
-    same(grasp(bare, cloud=rod().points), grasp(rod()))
+    check_same(grasp(bare, cloud=rod().points), grasp(rod()))
     assert (grasp(bare, cloud=()).seen == 0).all()
     assert len(grasp(bare, cloud=(), plane=(0, 0, 1, 0.11))) < len(grasp(bare, cloud=()))
 
@@ -229,15 +212,14 @@ def test_a_gripper_in_proportion():
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    "options",
     [
-        (dict(max_opening="wide"), "max_opening = 'wide'"),
-        (dict(max_opening=True), "max_opening"),
-        (dict(max_opening=1.0, finger=(1, 2)), r"finger = \(1, 2\): must be three lengths"),
-        (dict(max_opening=1.0, palm=(1, 0, 1)), "a side of palm = 0: .* above 0"),
-        (dict(max_opening=1.0, finger=(1, 1, 1), reach=1.5), "reach = 1.5: .* at most 1.0"),
+        *(dict(max_opening=opening) for opening in ("wide", True, 0)),
+        dict(max_opening=1.0, finger=(1, 2)),
+        dict(max_opening=1.0, palm=(1, 0, 1)),
+        dict(max_opening=1.0, finger=(1, 1, 1), reach=1.5),
     ],
 )
-def test_wrong_grippers(options, said):
-    with pytest.raises(InvalidParameterError, match=said):
+def test_impossible_grippers_are_refused(options):
+    with pytest.raises(InvalidParameterError):
         Gripper(**options)
