@@ -14,22 +14,22 @@ def bare(nodes, edges, radii):
     return as_forest(Skeleton(nodes, edges, radii, (), (), ()), True, None)
 
 
-def figure(apart=0.0, pieces=20):
+def figure(rise=0.0, pieces=20):
     """A trunk of radius 0.2 along z; two arms of radius 0.05 leave it, one so much higher than the other."""
     arm = np.linspace(0, 1, pieces + 1)[1:]
-    trunk = [[0, 0, z] for z in (0, 0.5, 1, 1 + apart, 1.5)]
-    left, right = ([[side * x, 0, 1 + up] for x in arm] for side, up in ((-1, 0), (1, apart)))
-    nodes = np.array([*trunk, *left, *right])
+    trunk = [[0, 0, z] for z in (0, 0.5, 1, 1 + rise, 1.5)]
+    arms = [[side * x, 0, 1 + up] for side, up in ((-1, 0), (1, rise)) for x in arm]
+    nodes = np.array([*trunk, *arms])
     chain = np.arange(pieces - 1)
     edges = [(0, 1), (1, 2), (2, 3), (3, 4), (2, 5), (3, 5 + pieces)]
     edges += [(5 + first + i, 6 + first + i) for first in (0, pieces) for i in chain]
     return nodes, edges, [0.2] * 5 + [0.05] * 2 * pieces
 
 
-@pytest.mark.parametrize("apart", [0.05, 0.15])
+@pytest.mark.parametrize("rise", [0.05, 0.15])
 @pytest.mark.parametrize("pieces", [1, 20])
-def test_limbs_begin_at_one_joint_and_leave_its_ball_at_one_height(apart, pieces):
-    bones = armature(bare(*figure(apart, pieces)))
+def test_limbs_begin_at_one_joint_and_leave_its_ball_at_one_height(rise, pieces):
+    bones = armature(bare(*figure(rise, pieces)))
     (joint,) = bones.junctions
     assert bones.degree[joint] == 4
     np.testing.assert_allclose(bones.vertices[joint, :2], 0, atol=1e-12)

@@ -1,4 +1,4 @@
-"""Editing of skeletons: what goes, what stays, and that the topology does."""
+"""Editing of skeletons: which vertices, branches and points remain, and that the topology stays."""
 
 from dataclasses import replace
 
@@ -35,21 +35,21 @@ def comb():
 
 
 def same_points(before, after):
-    """No point is lost, and each is with a vertex that is there."""
+    """No point is lost, and each has a vertex that remains."""
     assert (after.vertex_of_point < len(after.vertices)).all()
     np.testing.assert_array_equal(after.vertex_of_point >= 0, before.vertex_of_point >= 0)
 
 
 @pytest.mark.parametrize(("length", "leaves"), [(0, 5), (1, 5), (1.5, 4), (3.2, 2), (99, 2)])
-def test_short_branches_go_and_the_longest_way_stays(length, leaves):
-    left = prune(comb(), length=length)
-    assert (len(left.leaves), left.n_components) == (leaves, 1)
-    same_points(comb(), left)
+def test_short_branches_go_and_the_longest_path_stays(length, leaves):
+    edited = prune(comb(), length=length)
+    assert (len(edited.leaves), edited.n_components) == (leaves, 1)
+    same_points(comb(), edited)
     if leaves < 5:
-        assert left.vertex_of_point[11] == 3  # where its branch grew from
+        assert edited.vertex_of_point[11] == 3  # where its branch grew from
 
 
-def test_of_a_fork_the_shorter_prong_goes():
+def test_the_shorter_limb_of_a_fork_goes():
     fork = graph([(0, 0, 0), (9, 0, 0), (10, 1, 0), (12, -1, 0)], [(0, 1), (1, 2), (1, 3)])
     np.testing.assert_array_equal(prune(fork, length=5).vertices, fork.vertices[[0, 1, 3]])
 
@@ -60,9 +60,9 @@ def test_orders(grown):
     assert stem.length == pytest.approx(table.length[table.order == 0].sum())
     assert prune(grown, order=int(table.order.max())).length == pytest.approx(grown.length)
     same_points(grown, stem)
-    left = prune(grown, order=1)
-    np.testing.assert_array_equal(left.vertices[0], grown.report.root)
-    assert len(np.unique(left.edges[:, 1])) == len(left.vertices) - 1  # each has one parent
+    edited = prune(grown, order=1)
+    np.testing.assert_array_equal(edited.vertices[0], grown.report.root)
+    assert len(np.unique(edited.edges[:, 1])) == len(edited.vertices) - 1  # each has one parent
 
 
 def test_what_cannot_be_pruned(ring):
@@ -73,28 +73,28 @@ def test_what_cannot_be_pruned(ring):
 
 def test_a_straight_line_is_its_ends():
     line = graph([(x, 2 * x, 0) for x in range(50)], [(i, i + 1) for i in range(49)])
-    left = simplify(line, tolerance=1e-9)
-    np.testing.assert_array_equal(left.vertices, line.vertices[[0, 49]])
-    np.testing.assert_array_equal(left.vertex_of_point, np.arange(50) > 24)
+    edited = simplify(line, tolerance=1e-9)
+    np.testing.assert_array_equal(edited.vertices, line.vertices[[0, 49]])
+    np.testing.assert_array_equal(edited.vertex_of_point, np.arange(50) > 24)
 
 
 @pytest.mark.parametrize("tolerance", [0.001, 0.1])
-def test_no_vertex_was_farther_away(grown, tolerance):
-    left = simplify(grown, tolerance=tolerance)
-    a, b = left.vertices[left.edges].swapaxes(0, 1)
+def test_dropped_vertices_are_within_the_tolerance(grown, tolerance):
+    edited = simplify(grown, tolerance=tolerance)
+    a, b = edited.vertices[edited.edges].swapaxes(0, 1)
     offset = grown.vertices[:, None] - a
     along = ((offset * (b - a)).sum(2) / ((b - a) ** 2).sum(1)).clip(0, 1)
-    away = np.linalg.norm(offset - along[..., None] * (b - a), axis=2).min(axis=1)
-    assert away.max() <= tolerance * (1 + 1e-9)
-    assert len(left.vertices) < len(grown.vertices)
-    np.testing.assert_array_equal(left.vertices[left.leaves], grown.vertices[grown.leaves])
-    assert len(left.junctions) == len(grown.junctions)
-    same_points(grown, left)
+    distance = np.linalg.norm(offset - along[..., None] * (b - a), axis=2).min(axis=1)
+    assert distance.max() <= tolerance * (1 + 1e-9)
+    assert len(edited.vertices) < len(grown.vertices)
+    np.testing.assert_array_equal(edited.vertices[edited.leaves], grown.vertices[grown.leaves])
+    assert len(edited.junctions) == len(grown.junctions)
+    same_points(grown, edited)
 
 
 def test_loops_stay_and_a_ring_is_at_least_a_triangle(ring):
-    left = simplify(ring, tolerance=99)
-    assert (left.n_loops, len(left.vertices)) == (1, 3)
+    edited = simplify(ring, tolerance=99)
+    assert (edited.n_loops, len(edited.vertices)) == (1, 3)
     places = [(0, 0, 0), (1, 0, 0), (2, 0, 0), (1, 1, 0), (1, -1, 0), (3, 0, 0), (4, 0, 0)]
     theta = graph(places, [(0, 1), (1, 2), (0, 3), (3, 2), (0, 4), (4, 2), (2, 5), (5, 6)])
     assert simplify(theta, tolerance=99).n_loops == theta.n_loops == 2
@@ -102,38 +102,38 @@ def test_loops_stay_and_a_ring_is_at_least_a_triangle(ring):
 
 def test_the_longest_component():
     two = graph([(0, 0, 0), (1, 0, 0), (5, 0, 0), (5, 3, 0), (9, 9, 9)], [(0, 1), (2, 3)])
-    left = largest_component(two)
-    np.testing.assert_array_equal(left.vertices, two.vertices[2:4])
-    np.testing.assert_array_equal(left.vertex_of_point, [-1, -1, 0, 1, -1])
-    assert largest_component(left) is left
+    edited = largest_component(two)
+    np.testing.assert_array_equal(edited.vertices, two.vertices[2:4])
+    np.testing.assert_array_equal(edited.vertex_of_point, [-1, -1, 0, 1, -1])
+    assert largest_component(edited) is edited
 
 
-def test_loops_are_cut_and_told(ring, grown):
-    left, cut = cut_loops(ring)
-    assert (left.n_loops, left.n_components) == (0, 1)
+def test_cut_loops_have_edges(ring, grown):
+    edited, cut = cut_loops(ring)
+    assert (edited.n_loops, edited.n_components) == (0, 1)
     assert np.linalg.norm(cut[0, 0] - cut[0, 1]) == pytest.approx(ring.edge_lengths.max())
-    assert left.length == pytest.approx(ring.length - ring.edge_lengths.max())
-    left, cut = cut_loops(grown)
-    np.testing.assert_array_equal(left.edges, grown.edges)
+    assert edited.length == pytest.approx(ring.length - ring.edge_lengths.max())
+    edited, cut = cut_loops(grown)
+    np.testing.assert_array_equal(edited.edges, grown.edges)
     assert cut.shape == (0, 2, 3)
 
 
 @pytest.mark.parametrize("root", ["-z", "thickest", (0, 0, 9), "0,0,9", 7])
 def test_another_root(grown, root):
-    left = reroot(grown, root)
-    np.testing.assert_array_equal(left.vertices[0], left.report.root)
-    assert len(np.unique(left.edges[:, 1])) == len(left.vertices) - 1
-    assert left.length == pytest.approx(grown.length)
+    edited = reroot(grown, root)
+    np.testing.assert_array_equal(edited.vertices[0], edited.report.root)
+    assert len(np.unique(edited.edges[:, 1])) == len(edited.vertices) - 1
+    assert edited.length == pytest.approx(grown.length)
     expected = {"-z": grown.vertices[:, 2].argmax(), 7: 7}.get(root)
-    assert expected is None or (left.vertices[0] == grown.vertices[expected]).all()
+    assert expected is None or (edited.vertices[0] == grown.vertices[expected]).all()
 
 
 def test_components_follow_the_one_of_the_root():
     two = graph([(9, 0, 0), (8, 0, 0), (0, 0, 0), (1, 0, 0), (20, 0, 0)], [(0, 1), (2, 3)])
-    left = reroot(two, "x")
-    np.testing.assert_array_equal(left.vertices[:, 0], [0, 1, 8, 9, 20])
-    np.testing.assert_array_equal(left.edges, [[0, 1], [2, 3]])
-    np.testing.assert_array_equal(left.vertex_of_point, [3, 2, 0, 1, 4])
+    edited = reroot(two, "x")
+    np.testing.assert_array_equal(edited.vertices[:, 0], [0, 1, 8, 9, 20])
+    np.testing.assert_array_equal(edited.edges, [[0, 1], [2, 3]])
+    np.testing.assert_array_equal(edited.vertex_of_point, [3, 2, 0, 1, 4])
 
 
 def test_what_has_no_root(ring):
@@ -153,7 +153,7 @@ def test_what_has_no_root(ring):
         *((reroot, dict(root=wrong)) for wrong in ("w", 9999, -1, (1, 2), "1,2", (np.nan, 0, 0), True, [[]])),
     ],
 )
-def test_refuses(edit, wrong):
+def test_impossible_options_are_refused(edit, wrong):
     with pytest.raises(InvalidParameterError):
         edit(comb(), **wrong)
 
@@ -171,10 +171,10 @@ def test_refuses(edit, wrong):
 def test_half_axes_stay_with_their_vertices(grown, edit):
     two = replace(grown, edges=np.delete(grown.edges, 5, axis=0))  # two components
     two = replace(two, half_width=two.vertices[:, 0] + 9, half_thickness=two.vertices[:, 1] + 2)
-    left = edit(two)
-    assert 0 < len(left.vertices) <= len(two.vertices)
-    np.testing.assert_array_equal(left.half_width, left.vertices[:, 0] + 9)
-    np.testing.assert_array_equal(left.half_thickness, left.vertices[:, 1] + 2)
+    edited = edit(two)
+    assert 0 < len(edited.vertices) <= len(two.vertices)
+    np.testing.assert_array_equal(edited.half_width, edited.vertices[:, 0] + 9)
+    np.testing.assert_array_equal(edited.half_thickness, edited.vertices[:, 1] + 2)
 
 
 @pytest.mark.parametrize("edit", [largest_component, simplify, lambda it: cut_loops(it)[0]])

@@ -1,4 +1,4 @@
-"""Recipes: round trips, what is refused and how, what a report holds."""
+"""Recipes: round trips, what is refused, and recipes in reports."""
 
 import dataclasses
 import json
@@ -72,9 +72,9 @@ def parts(cls):
 PREPARING = (Sampler, OutlierRemover, Denoiser, Thinner)
 
 
-@given(made=st.tuples(*map(parts, (*PREPARING, RingBuilder, Contractor, LPRReducer, Contractor, Connector, Refiner))))
-def test_every_parameter_of_every_filter_survives(made):
-    pipeline = Pipeline(*made)
+@given(stages=st.tuples(*map(parts, (*PREPARING, RingBuilder, Contractor, LPRReducer, Contractor, Connector, Refiner))))
+def test_every_parameter_of_every_filter_survives(stages):
+    pipeline = Pipeline(*stages)
     recipe = to_recipe(pipeline)
     for again in (from_recipe(recipe), from_recipe(json.loads(json.dumps(recipe, allow_nan=False)))):
         assert again == pipeline
@@ -89,7 +89,7 @@ def test_files(tmp_path):
     assert [*tmp_path.iterdir()] == [path]
 
 
-def test_what_a_recipe_looks_like():
+def test_a_recipe_is_a_table_per_stage():
     pipeline = RingBuilder(k=20) | Contractor(stop=RingSizeRatio(0.5)) | Connector(radius="3%")
     recipe = to_recipe(pipeline)
     assert list(recipe) == ["glsk_o3d", "pipeline"]
@@ -116,7 +116,7 @@ def one(name, **options):
 
 WRONG = [  # where it is wrong, the words that help, and the recipe
     ("glsk_o3d.version", '{"glsk_o3d": {"version": 1}, "pipeline": [...]}', {"pipeline": [GOOD]}),
-    ("glsk_o3d.version", "update", {"glsk_o3d": {"version": 2}, "stages": "of whatever shape"}),
+    ("glsk_o3d.version", "update", {"glsk_o3d": {"version": 2}, "stages": "in another form"}),
     ("", "not [{'filter': 'RingBuilder'}]", [GOOD]),
     ("piepline", "'pipeline'", {**HEAD, "piepline": [GOOD]}),
     ("pipeline", "is missing", HEAD),
@@ -196,7 +196,7 @@ def never(iterations):
     ],
 )
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
-def test_what_no_recipe_can_hold_breaks_no_run(tmp_path, stage, place, name, key):
+def test_a_run_with_foreign_functions_has_a_recipe_that_cannot_be_read(tmp_path, stage, place, name, key):
     pipeline = RingBuilder() | stage | Connector() | Refiner()
     with pytest.raises(RecipeError, match=rf"^{re.escape(place)}.*{name}"):
         save_recipe(pipeline, tmp_path / "r.json")
@@ -211,8 +211,8 @@ def test_what_no_recipe_can_hold_breaks_no_run(tmp_path, stage, place, name, key
         from_recipe(recipe)
 
 
-def test_a_class_of_another_module_is_named_with_it():
-    """So that who lacks the plugin knows it, and a namesake is not taken for it."""
+def test_a_class_of_another_module_is_written_with_its_module():
+    """The message of a missing plugin names it, and a class of the same name in another module is refused."""
     recipe = recipe_of(Homemade().table())
     assert recipe["pipeline"] == [{"filter": "Homemade", "from": __name__}]
     with pytest.raises(RecipeError, match=re.escape(f"install {__name__}")):
@@ -225,7 +225,7 @@ def test_a_class_of_another_module_is_named_with_it():
         to_recipe(Pipeline(namesake()))
 
 
-def test_the_documentation(root):
+def test_the_recipe_in_the_documentation(root):
     (block,) = re.findall(r"```json\n(.*?)```", (root / "docs" / "plugins.md").read_text(), re.DOTALL)
     assert from_recipe(json.loads(block)).stages[2].reducer == LPRReducer(phi=2e5)
 

@@ -11,9 +11,6 @@ from glsk_o3d.errors import InvalidParameterError
 from glsk_o3d.samples import SAMPLES, sample_object, signed_distance, tree
 from glsk_o3d.samples.capsules import union_sample, visible
 
-UNIONS = ("sauropod", "tube", "y_junction", "tree")
-
-
 TOPOLOGY = {  # components, loops and leaves of the axis
     "sauropod": (1, 1, 6),
     "tube": (1, 0, 2),
@@ -56,7 +53,11 @@ def test_seed_size_and_noise_of_every_sample(name):
     np.testing.assert_allclose(noise.std(axis=0), 0.01 * np.linalg.norm(np.ptp(clean, axis=0)), rtol=0.06)
 
 
-@pytest.mark.parametrize("name", UNIONS)
+def axis_of(sample):
+    return sample.nodes, sample.edges, sample.radii
+
+
+@pytest.mark.parametrize("name", ["sauropod", "tube", "y_junction", "tree"])
 def test_points_of_unions_lie_on_the_surface(name):
     sample = SAMPLES[name](n=1000)
     np.testing.assert_allclose(signed_distance(sample.points, *axis_of(sample)), 0, atol=2e-9)
@@ -146,18 +147,14 @@ def test_signed_distance_of_a_tapered_capsule_against_brute_force():
     np.testing.assert_allclose(signed_distance(points, nodes, edges, radii), brute, atol=1e-6)
 
 
-def test_signed_distance_of_swallowed_and_lonely_balls():
+@pytest.mark.parametrize("edge", [[0, 1], [1, 0]])
+def test_signed_distance_of_a_ball_in_a_ball_and_of_a_ball_without_an_edge(edge):
     nodes, radii = np.array([[0.0, 0, 0], [0.1, 0, 0], [5, 0, 0]]), np.array([1.0, 0.2, 0.5])
     points = np.array([[2.0, 0, 0], [5, 2, 0], [0, 0, 0]])
-    for edges in ([[0, 1]], [[1, 0]]):
-        np.testing.assert_allclose(signed_distance(points, nodes, np.array(edges), radii), [1, 1.5, -1])
+    np.testing.assert_allclose(signed_distance(points, nodes, np.array([edge]), radii), [1, 1.5, -1])
 
 
-def axis_of(sample):
-    return sample.nodes, sample.edges, sample.radii
-
-
-def test_of_a_visible_point_nothing_is_in_front():
+def test_nothing_is_in_front_of_a_visible_point():
     whole, along = samples.sauropod(n=300, cameras=None), np.linspace(0, 0.995, 400)[:, None, None]
     for camera in np.array([samples.TWO_CAMERAS[0], (2, 0.1, 0.4), (0.01, -2, 0.02)]):
         seen = visible(whole.points, camera, *axis_of(whole))
@@ -183,27 +180,26 @@ def test_the_animal_and_its_scan():
     assert signed_distance(np.array([[0.0, 0, 0.6]]), *axis_of(scan))[0] > 2 * 0.03
 
 
+@pytest.mark.parametrize("wrong", [dict(n=0), dict(n=2.5), dict(n=True), dict(noise=-1)])
+@pytest.mark.parametrize("make", SAMPLES.values())
+def test_impossible_numbers_are_refused(make, wrong):
+    with pytest.raises(InvalidParameterError):
+        make(**wrong)
+
+
 @pytest.mark.parametrize(
     ("make", "wrong"),
     [
-        (samples.sauropod, dict(cameras=())),
-        (samples.sauropod, dict(cameras=[(0, 0, 0.36)])),
-        (samples.tube, dict(radius=0)),
-        (samples.tube, dict(length=-1)),
+        *((samples.sauropod, dict(cameras=cameras)) for cameras in ((), [(0, 0, 0.36)])),
+        *((samples.tube, wrong) for wrong in (dict(radius=0), dict(length=-1), dict(length=np.inf))),
         (samples.torus, dict(radius=0.5, ring_radius=0.4)),
         (samples.y_junction, dict(radii=(0.1, 0.1, 0.7))),
-        (samples.tube, dict(length=np.inf)),
         (samples.sheet, dict(bend=360)),
         (sample_object, dict(name="teapot")),
-        *(
-            (make, wrong)
-            for make in SAMPLES.values()
-            for wrong in (dict(n=0), dict(n=2.5), dict(n=True), dict(noise=-1))
-        ),
         *((tree, dict(forks=forks)) for forks in (-1, 9, 2.0, True)),
     ],
 )
-def test_refuses_impossible_shapes(make, wrong):
+def test_impossible_shapes_are_refused(make, wrong):
     with pytest.raises(InvalidParameterError):
         make(**wrong)
 
@@ -226,5 +222,5 @@ def test_a_tree_forks_in_two_and_tapers_from_its_foot(forks):
 def test_no_tip_of_a_tree_is_inside_another_limb(seed):
     drawn = tree(64, forks=5, seed=seed)
     tips = np.flatnonzero(np.bincount(drawn.edges.ravel()) == 1)[1:]
-    apart = cKDTree(drawn.nodes[tips]).query(drawn.nodes[tips], 2)[0][:, 1]
-    assert (apart > 2 * drawn.radii[tips]).all()
+    gap = cKDTree(drawn.nodes[tips]).query(drawn.nodes[tips], 2)[0][:, 1]
+    assert (gap > 2 * drawn.radii[tips]).all()
