@@ -1,4 +1,4 @@
-"""Filters, stopping rules and pipelines of other distributions, found through their entry points."""
+"""Filters, stopping rules and pipelines of other distributions, by their entry points."""
 
 import dataclasses
 import sys
@@ -22,22 +22,22 @@ class _Unfit(Exception):
     """A plugin is not what it should be."""
 
 
-_found: dict[str, dict[str, Any]] = {}
+_LOADED: dict[str, dict[str, Any]] = {}
 
 
 def plugins(group: str) -> dict[str, Any]:
     """What the entry points of `FILTER_GROUP` or `PIPELINE_GROUP` name: classes, or callables that make a Pipeline.
 
-    A PluginWarning says once of each that is broken what is wrong; it is left out, and the others are not.
+    A PluginWarning says once what is wrong with each broken plugin. Broken plugins are skipped, the others stay.
     """
-    if group not in _found:
-        loaded = _found[group] = {}  # already there for plugins that themselves ask for plugins
+    if group not in _LOADED:
+        loaded = _LOADED[group] = {}  # plugins may themselves ask for plugins
         problems: list[str] = []
         for entry in entry_points(group, problems):
             try:
                 loaded[entry.name] = _load(entry, group, loaded)
             except KeyboardInterrupt:
-                del _found[group]  # next time from the start
+                del _LOADED[group]  # next time from the start
                 raise
             except BaseException as error:  # whatever code of others raises; some is no Exception
                 cause = str(error) if isinstance(error, _Unfit) else f"{type(error).__name__}: {error}"
@@ -45,12 +45,12 @@ def plugins(group: str) -> dict[str, Any]:
                 problems.append(f"plugin {entry.name!r} ({entry.value}) of {package} left out: {cause}")
         for problem in problems:
             warnings.warn(problem, PluginWarning, stacklevel=outside())
-    return _found[group]
+    return _LOADED[group]
 
 
 def forget_plugins() -> None:
     """Search for plugins again at the next use, after one was installed into a running process."""
-    _found.clear()
+    _LOADED.clear()
 
 
 def _load(entry: EntryPoint, group: str, loaded: dict[str, Any]) -> Any:

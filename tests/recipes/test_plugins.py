@@ -1,4 +1,4 @@
-"""Filters and pipelines of other distributions: found, merged, and left out where they are broken."""
+"""Filters and pipelines of other distributions: merged with the built-in ones, and skipped where they are broken."""
 
 import os
 import subprocess
@@ -40,11 +40,11 @@ SCRIPT = """<!DOCTYPE FilterScript>
 """
 
 
-# ---- found
+# ---- entry points
 
 
 @pytest.mark.usefixtures("example")
-def test_are_merged_with_the_built_in_ones():
+def test_plugins_follow_the_built_in_ones():
     filters = [name for name, cls in BUILTIN.items() if issubclass(cls, Filter)]
     rules = [name for name in BUILTIN if name not in filters]
     assert list(catalogue()) == [*filters, "Voxel", "RadiusFloor", *rules, "SolveCount"]
@@ -53,7 +53,7 @@ def test_are_merged_with_the_built_in_ones():
 
 
 @pytest.mark.usefixtures("example")
-def test_on_the_command_line_and_in_a_script(tmp_path, monkeypatch):
+def test_plugins_on_the_command_line_and_in_a_script(tmp_path, monkeypatch):
     from glsk_o3d.cli.main import app
 
     monkeypatch.chdir(tmp_path)
@@ -111,19 +111,15 @@ def test_filters_of_clouds_stand_in_front_and_in_a_row(example, assert_sound):
         (Cloud, lambda *_: {}["inside"], StageError, f"^Made of {__name__} failed: KeyError: 'inside'$"),
     ],
 )
-def test_a_filter_that_breaks_its_promise_or_fails_is_named(produces, run, error, message):
+def test_a_filter_with_a_wrong_result_or_an_error_is_named(produces, run, error, message):
     made = type("Made", (Filter,), {"produces": produces, "run": run, "check": lambda self: None})()
     with pytest.raises(error, match=message):
         made(POINTS)
 
 
-@pytest.mark.usefixtures("example")
-def test_a_recipe_whose_plugin_is_gone(monkeypatch):
-    recipe = to_recipe(named_pipeline("coarse"))
-    assert from_recipe(recipe) == named_pipeline("coarse")
-    monkeypatch.setattr("glsk_o3d.recipes.plugins._found", {"glsk_o3d.filters": {}})
+def test_a_recipe_names_the_plugin_that_is_missing():
     with pytest.raises(RecipeError, match=r"^pipeline\[0\]\.filter: .*'Voxel'.*install glsk_example"):
-        from_recipe(recipe)
+        from_recipe({"glsk_o3d": {"version": 1}, "pipeline": [{"filter": "Voxel", "from": "glsk_example"}]})
 
 
 # ---- broken ones
@@ -134,11 +130,6 @@ from glsk_o3d import Cloud, Filter, Pipeline, Refiner, Skeleton, pipelines
 from glsk_o3d.parameters import Parameters, parameter
 """
 FROZEN = "@dataclass(frozen=True, kw_only=True)\nclass Thing({}):\n    {}\n    {}"
-NO_FILTER = "it is no frozen dataclass derived from glsk_o3d.Filter"
-
-
-def field(words):
-    return FROZEN.format("Filter", f"a: int = parameter({words})", "run = print")
 
 
 BROKEN_FILTERS = [
@@ -146,14 +137,12 @@ BROKEN_FILTERS = [
     ("raise SystemExit(3)", "SystemExit: 3"),
     ("class Panic(BaseException): pass\nraise Panic('rust')", "Panic: rust"),
     ("", "has no attribute 'Thing'"),
-    ("class Thing: pass", NO_FILTER),
-    ("@dataclass\nclass Thing(Filter): run = print", NO_FILTER),
+    ("@dataclass\nclass Thing(Filter): run = print", "it is no frozen dataclass"),
     ("@dataclass(frozen=True)\nclass Other(Filter): run = print\nThing = Other", "the name of the class, 'Other'"),
     (FROZEN.format("Filter", "a: int = 3", "run = print"), "its field 'a' is not made by glsk_o3d.parameters"),
-    (field("3, 'A.', type='int'").replace("a:", "rule:"), "its field 'rule' is not made by"),
-    (field("3, 'A.', type='int', low=4"), "InvalidParameterError: Thing.a = 3: must be at least 4"),
+    (FROZEN.format("Filter", "rule: int = parameter(3, 'A.')", "run = print"), "its field 'rule' is not made by"),
+    (FROZEN.format("Filter", "a: int = parameter(3, 'A.', low=4)", "run = print"), "Thing.a = 3: must be at least 4"),
     (FROZEN.format("Filter", "consumes = 'mesh'", "run = print"), "there is no filter from mesh to "),
-    (FROZEN.format("Filter", "consumes, produces = Skeleton, Cloud", "run = print"), "there is no filter from "),
     (FROZEN.format("Filter", "pass", ""), "it has no method run"),
     (FROZEN.format("Parameters", "pass", ""), "a stopping rule must be callable"),
 ]
@@ -161,19 +150,17 @@ BROKEN_PIPELINES = [
     ("def Thing(): raise OSError('no disk')", "OSError: no disk"),
     ("def Thing(): return 3", "it must be a callable that returns a Pipeline, and gives a int"),
     ("Thing = pipelines.default()", "TypeError: "),  # a pipeline wants a cloud to be called with
-    ("def Thing(): return Pipeline(Refiner(recentre=-1))", "InvalidParameterError: Refiner.recentre = -1: must be"),
 ]
 
 
-def only_warning(ask):
+def only_warning(function):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        ask()
-        ask()  # once in a process
-    (one,) = caught
-    assert one.category is PluginWarning
-    assert one.filename == __file__
-    return str(one.message)
+        function()
+        function()  # once in a process
+    (warning,) = caught
+    assert (warning.category, warning.filename) == (PluginWarning, __file__)
+    return str(warning.message)
 
 
 @pytest.mark.usefixtures("example")
@@ -181,18 +168,18 @@ def only_warning(ask):
     ("group", "code", "cause"),
     [*(("filters", *case) for case in BROKEN_FILTERS), *(("pipelines", *case) for case in BROKEN_PIPELINES)],
 )
-def test_a_broken_one_warns_and_the_others_stay(install, group, code, cause):
+def test_a_broken_plugin_warns_and_the_others_stay(install, group, code, cause):
     install("glsk-broken", "1.5", HEAD + code, f"[glsk_o3d.{group}]\nThing = glsk_broken:Thing\n")
-    said = only_warning(lambda: (catalogue(), known_pipelines()))
-    assert said.startswith("plugin 'Thing' (glsk_broken:Thing) of glsk-broken 1.5 left out: ")
-    assert cause in said
+    message = only_warning(lambda: (catalogue(), known_pipelines()))
+    assert message.startswith("plugin 'Thing' (glsk_broken:Thing) of glsk-broken 1.5 left out: ")
+    assert cause in message
     assert {*BUILTIN, "Voxel", "SolveCount"} <= catalogue().keys()
     assert known_pipelines().keys() == {*PIPELINES, "coarse"}
 
 
 @pytest.mark.parametrize(("name", "owner"), [("Refiner", "the built-in one"), ("Voxel", "one of another plugin")])
 @pytest.mark.usefixtures("example")
-def test_names_that_are_taken(install, name, owner):
+def test_a_name_belongs_to_the_first_plugin(install, name, owner):
     before = catalogue().get(name)
     code = HEAD + FROZEN.format("Filter", "run = print", "").replace("Thing", name)
     install("zz-later", "1", code, f"[glsk_o3d.filters]\n{name} = zz_later:{name}\n")
@@ -200,25 +187,23 @@ def test_names_that_are_taken(install, name, owner):
     assert catalogue()[name] is before
 
 
-def test_a_run_of_a_built_in_pipeline_looks_for_none(example, root):
+def test_a_run_of_a_built_in_pipeline_loads_no_plugin(example, root):
     """Neither the import nor a run asks the installed distributions anything; the command's warning is one line."""
     entries = example / "glsk_example-0.3.dist-info" / "entry_points.txt"
     entries.write_text(entries.read_text() + "[glsk_o3d.filters]\nThing = nowhere:Thing\n")
     code = (
         "import sys, glsk_o3d, glsk_o3d.samples as s; glsk_o3d.skeletonize(s.torus(n=300).points);"
         "glsk_o3d.to_recipe(glsk_o3d.pipelines.default());"
-        "print(glsk_o3d.recipes.plugins._found, 'glsk_example' in sys.modules)"
+        "print('glsk_example' in sys.modules)"
     )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(example), str(root)])}
 
     def python(*words):
         return subprocess.run([sys.executable, *words], capture_output=True, text=True, env=environment)
 
-    assert python("-W", "error", "-c", code).stdout == "{} False\n"
+    assert python("-W", "error", "-c", code).stdout == "False\n"
     run = python("-m", "glsk_o3d.cli.main", "filters", "Voxel")
     assert run.returncode == 0
     assert "Voxel  cloud -> cloud" in run.stdout
-    assert run.stderr == (
-        "glsk: warning: plugin 'Thing' (nowhere:Thing) of glsk-example 0.3 left out: "
-        "ModuleNotFoundError: No module named 'nowhere'\n"
-    )
+    assert run.stderr.startswith("glsk: warning: plugin 'Thing' (nowhere:Thing) of glsk-example 0.3 left out: ")
+    assert run.stderr.count("\n") == 1
