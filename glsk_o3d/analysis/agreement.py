@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..data.decisions import Place
+from ..data.decisions import Decision, Place
 from ..data.skeleton import Skeleton
 from .comparison import TIP_REACH, matched
 from .curves import distances
@@ -71,23 +71,26 @@ class SkeletonAgreement:
 
 def compare_skeletons(ours: Skeleton, theirs: Skeleton, step: float) -> SkeletonAgreement:
     """How two skeletons agree, by places on both that are `step` apart."""
-    both = [distances(*pair, step) for pair in ((ours, theirs), (theirs, ours))]
-    in_radii = [distance / radius for distance, radius in both]
-    mine, other = (each.vertices[each.leaves] for each in (ours, theirs))
+    in_radii = [np.divide(*distances(*pair, step)) for pair in ((ours, theirs), (theirs, ours))]
+    ends, other_ends = (skeleton.vertices[skeleton.leaves] for skeleton in (ours, theirs))
     reach = TIP_REACH * np.maximum(ours.radii[ours.leaves][:, None], theirs.radii[theirs.leaves])
-    pairs = matched(mine, other, reach) if reach.size else []
-    extra, missing = (np.delete(ends, [pair[i] for pair in pairs], 0).tolist() for i, ends in enumerate((mine, other)))
-    calls = [[it for it in each.report.decisions if it.about == "limb"] for each in (ours, theirs)]
-    closest = [min(each, key=lambda it: abs(it.probability - 0.5)) for each in calls if each]
-    certainty = [max(it.probability, 1 - it.probability) for it in closest]
+    rows, other_rows = np.reshape(matched(ends, other_ends, reach) if reach.size else (), (-1, 2)).astype(int).T
+    closest = [
+        min(calls, key=lambda call: abs(call.probability - 0.5)) for calls in map(_limbs, (ours, theirs)) if calls
+    ]
+    certainty = [max(call.probability, 1 - call.probability) for call in closest]
     return SkeletonAgreement(
-        distance_in_radii=float(np.mean([each.mean() for each in in_radii])),
-        hausdorff95_in_radii=float(max(np.percentile(each, 95) for each in in_radii)),
+        distance_in_radii=float(np.mean([distance.mean() for distance in in_radii])),
+        hausdorff95_in_radii=float(max(np.percentile(distance, 95) for distance in in_radii)),
         components=(ours.n_components, theirs.n_components),
         loops=(ours.n_loops, theirs.n_loops),
         leaves=(len(ours.leaves), len(theirs.leaves)),
-        missing=tuple(map(tuple, missing)),
-        extra=tuple(map(tuple, extra)),
+        missing=tuple(map(tuple, np.delete(other_ends, other_rows, 0).tolist())),
+        extra=tuple(map(tuple, np.delete(ends, rows, 0).tolist())),
         doubt=float(np.log(np.divide(1, certainty)).sum()),
         closest_call=closest[int(np.argmin(certainty))].place if closest else None,
     )
+
+
+def _limbs(skeleton: Skeleton) -> list[Decision]:
+    return [decision for decision in skeleton.report.decisions if decision.about == "limb"]

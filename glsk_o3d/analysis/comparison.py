@@ -16,7 +16,7 @@ from .summary import structure
 PLACE_SPACING = 0.1  # fitted: of the places where curves are compared, in median true radii
 # derived: one radius from where the axis ends, in the middle of the round end, to the tip, and 1.5 along the axis
 TIP_REACH = 2.5
-# derived: where limbs meet is known to a local radius, that of the junction found and that of the true one
+# derived: the place where limbs meet is known to a local radius, in the skeleton and in the axis
 JUNCTION_REACH = 2.0
 
 
@@ -129,11 +129,10 @@ def compare(skeleton: Skeleton, truth: Any) -> Comparison:
     True
     """
     check_skeleton(skeleton)
-    none = np.empty(0)
     if not isinstance(truth, Truth):
-        nodes = truth.vertices if isinstance(truth, Skeleton) else getattr(truth, "nodes", none)
-        truth = Truth(nodes, getattr(truth, "edges", none), getattr(truth, "radii", none))
-    axis = Skeleton(truth.nodes, simple_edges(truth.edges), truth.radii, none, none, none)
+        nodes = truth.vertices if isinstance(truth, Skeleton) else getattr(truth, "nodes", ())
+        truth = Truth(nodes, getattr(truth, "edges", ()), getattr(truth, "radii", ()))
+    axis = Skeleton(truth.nodes, simple_edges(truth.edges), truth.radii, (), (), ())
     if len(skeleton.vertices) == 0:
         raise InvalidParameterError("the skeleton is empty: there is nothing to compare")
     step = PLACE_SPACING * np.median(truth.radii)
@@ -146,15 +145,15 @@ def compare(skeleton: Skeleton, truth: Any) -> Comparison:
     known = np.isfinite(curve_radius)
     radius_error = np.abs(curve_radius - radius)[known] / radius[known]
 
-    mine, true = structure(skeleton), structure(axis)
-    difference = {name: mine[name] - true[name] for name in ("components", "loops", "leaves", "junctions")}
+    counts, true_counts = structure(skeleton), structure(axis)
+    difference = {name: counts[name] - true_counts[name] for name in ("components", "loops", "leaves", "junctions")}
     topology = difference["components"] == 0 == difference["loops"]
     tips, tip_radius = axis.vertices[axis.leaves], axis.radii[axis.leaves]
     ends = skeleton.vertices[skeleton.leaves] if len(skeleton.leaves) else skeleton.vertices
     to_end = cKDTree(ends).query(tips)[0] / tip_radius
     tips_f1 = matching_f1(skeleton.vertices[skeleton.leaves], tips, TIP_REACH * tip_radius)
-    forks, local = merged_junctions(axis.vertices[axis.junctions], axis_places, axis_radius)
-    found_forks, _ = merged_junctions(skeleton.vertices[skeleton.junctions], axis_places, axis_radius)
+    true_junctions, local_radius = merged_junctions(axis.vertices[axis.junctions], axis_places, axis_radius)
+    junctions, _ = merged_junctions(skeleton.vertices[skeleton.junctions], axis_places, axis_radius)
     return Comparison(
         error=float(np.mean(error)),
         inside=float(np.mean(to_axis < radius)),
@@ -163,21 +162,21 @@ def compare(skeleton: Skeleton, truth: Any) -> Comparison:
         ends=float(to_end.mean()) if len(tips) else None,
         radius_error=float(radius_error.mean()) if len(radius_error) else None,
         tips_f1=tips_f1,
-        junctions_f1=matching_f1(found_forks, forks, JUNCTION_REACH * local),
+        junctions_f1=matching_f1(junctions, true_junctions, JUNCTION_REACH * local_radius),
         **difference,
         topology=topology,
         perfect=topology and tips_f1 == 1,
     )
 
 
-def matching_f1(found: np.ndarray, true: np.ndarray, reach: np.ndarray) -> float:
-    """F1 of found points as a guess at the true ones, (n, 3) and (m, 3); 1 if there are neither.
+def matching_f1(points: np.ndarray, true: np.ndarray, reach: np.ndarray) -> float:
+    """F1 of points as a guess at the true ones, (n, 3) and (m, 3); 1 if there are neither.
 
     A pair is no further apart than the `reach`, (m,), of its true point. The nearest pairs come first, each point once.
     """
-    if len(found) == 0 or len(true) == 0:
-        return float(len(found) == len(true))
-    return 2 * len(matched(found, true, reach)) / (len(found) + len(true))
+    if len(points) == 0 or len(true) == 0:
+        return float(len(points) == len(true))
+    return 2 * len(matched(points, true, reach)) / (len(points) + len(true))
 
 
 def matched(points: np.ndarray, targets: np.ndarray, reach: np.ndarray) -> list[tuple[int, int]]:

@@ -15,7 +15,7 @@ MOST_ON_A_CURVE = 10**7  # derived: on a curve; the arrays of so many take a gig
 def pieces(nodes: np.ndarray, edges: np.ndarray, step: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
     """Edges cut into equal pieces no longer than `step`: the edge of each piece, and how far along it its middle is.
 
-    Each edge may have a step of its own. Without edges every node stands for itself; `along` knows.
+    Each edge may have a step of its own. Without edges every node stands for itself, also in `along`.
     """
     if len(edges) == 0:
         return np.arange(len(nodes)), np.zeros(len(nodes))
@@ -65,7 +65,7 @@ def places_along(skeleton: Skeleton, step: Any) -> tuple[np.ndarray, np.ndarray,
 
 
 def check_graph(vertices: np.ndarray, edges: Any, name: str) -> np.ndarray:
-    """Edges as an (E, 2) int64 array; an InvalidParameterError says why `name`, as it calls the graph, is none."""
+    """Edges as an (E, 2) int64 array; an InvalidParameterError says what is wrong with the graph, called `name`."""
     edges = np.asarray(edges)
     edges = edges if edges.size else np.empty((0, 2), np.int64)
     if len(vertices) == 0:

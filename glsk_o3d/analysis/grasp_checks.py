@@ -1,4 +1,4 @@
-"""What a gripper would run into on its straight way in: points, and what lies behind a plane."""
+"""Obstacles of a gripper on a straight approach: points, and what lies behind a plane."""
 
 from typing import Any, NamedTuple
 
@@ -9,15 +9,15 @@ from ..errors import InvalidParameterError
 from ..geometry.vectors import norm
 from .gripper import Gripper
 
-CELL_NEIGHBOURS = 8  # measured: of 1230 ways through sparse walls 11 seemed free with 4, 1 with 6, none with 8
+CELL_NEIGHBOURS = 8  # measured: of 1230 approaches through sparse walls 11 seemed free with 4, 1 with 6, none with 8
 # derived: eight neighbours within half a finger's thickness leave a hole as wide as a finger with probability e^-10
 CLOSE_POINTS = 0.5
-WIDER = (1, 2, 3)  # measured: clearances to try; in noise of 0.5 % of the diagonal the first alone leaves few grasps
-AT_THE_SIDE = np.sqrt(3) / 2  # derived: where a side begins, over the radius: the cosine of 30 degrees
+CLEARANCES = (1, 2, 3)  # measured: how many to try; in noise of 0.5 % of the diagonal the first alone leaves few grasps
+SIDE_BEGINS = np.sqrt(3) / 2  # derived: where a side begins, over the radius: the cosine of 30 degrees
 
 
 class Approaches(NamedTuple):
-    """Straight ways in to P places, A to each of them."""
+    """Straight approaches to P places, A to each of them."""
 
     position: np.ndarray  # (P, 3)
     axis: np.ndarray  # (P, 3), of the part
@@ -34,24 +34,24 @@ def check_approaches(
     width: np.ndarray,
     clearance: float,
 ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray]:
-    """What keeps the gripper from coming in, open a little wider than the `width` of the part, (P,), or wider still.
+    """The obstacles of a gripper that is open one to three clearances wider than the `width` of the part, (P,).
 
     `points` are those of the object, none if they are not to be checked; `middle`, (m, 3), are on this side of the
-    plane, (4,), and the gripper comes from their diagonal away. The reasons, (P, A) bool arrays, are those at the least
-    opening, for approaches that are free at none. Three (P, A) arrays follow: the least opening at which the approach
-    is free, the depth of the fingertips past the axis, and the number of sides of the part that have points, as in
-    `GraspCandidates`.
+    plane, (4,), and an approach is as long as their diagonal. The obstacles, (P, A) bool arrays by name, are those at
+    the least opening, for approaches that are free at none. Three (P, A) arrays follow: the least opening at which the
+    approach is free, the depth of the fingertips past the axis, and the number of sides of the part that have points,
+    as in `GraspCandidates`.
     """
     distance = float(np.linalg.norm(np.ptp(middle, axis=0)))
     surface = cells(points, CLOSE_POINTS * min(gripper.finger[:2]))
     depth = np.minimum(gripper.reach, width / 2)
     shape = approaches.approach.shape[:2]
-    first: dict[str, Any] = {}
+    at_least_opening: dict[str, Any] = {}
     opening, sides_seen, free = np.full(shape, np.nan), np.zeros(shape, int), np.zeros(shape, bool)
-    for times in WIDER:
+    for times in CLEARANCES:
         wide = np.minimum(width + times * clearance, gripper.max_opening)
         low, high = swept(gripper, wide, depth, clearance, distance)
-        possible, reasons = ~free, dict[str, Any]()
+        possible, obstacles = ~free, dict[str, Any]()
         if len(points):
             touching = hits(approaches, surface, low, high, possible).any(axis=2)
             possible &= ~touching
@@ -59,21 +59,21 @@ def check_approaches(
             sides_seen = np.where(possible, occupied.sum(axis=2), sides_seen)
             empty = possible & ~occupied[..., :2].any(axis=2)
             possible &= ~empty
-            reasons |= {"ways in that touch points": touching, "ways in with nothing between the jaws": empty}
+            obstacles |= {"ways in that touch points": touching, "ways in with nothing between the jaws": empty}
         behind = possible & (plane is not None and hits_plane(approaches, plane, middle, low, high).any(axis=2))
         possible &= ~behind
-        reasons["ways in behind the plane"] = behind
+        obstacles["ways in behind the plane"] = behind
         opening = np.where(possible, wide[:, None], opening)
         free |= possible
-        first = first or reasons
-    blocked = {name: part & ~free for name, part in first.items()}
+        at_least_opening = at_least_opening or obstacles
+    blocked = {name: approach & ~free for name, approach in at_least_opening.items()}
     return blocked, opening, np.broadcast_to(depth[:, None], shape), sides_seen
 
 
 def swept(
     gripper: Gripper, opening: np.ndarray, depth: np.ndarray, clearance: float, distance: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Corners, (P, 3, 3), of what the gripper's boxes sweep on a straight way in, with half the clearance around them.
+    """Corners, (P, 3, 3), of the boxes that the gripper sweeps on its approach, with half the clearance around them.
 
     The inner faces of the fingers stay: between them and the part is half the clearance already.
     """
@@ -91,19 +91,19 @@ def sides(gripper: Gripper, opening: np.ndarray, depth: np.ndarray, width: np.nd
     Of a round section each has what is within 30 degrees of its direction; jaws close as far to either side of the axis
     as their tips reach past it.
     """
-    jaw, core, across = opening / 2, AT_THE_SIDE * width / 2, np.full_like(opening, gripper.finger[1] / 2)
+    jaw, core, across = opening / 2, SIDE_BEGINS * width / 2, np.full_like(opening, gripper.finger[1] / 2)
     low = [[-jaw, -across, -depth], [core, -across, -depth], [-jaw, -across, -jaw]]
     high = [[-core, across, depth], [jaw, across, depth], [jaw, across, -core]]
     return np.moveaxis(np.array(low), 2, 0), np.moveaxis(np.array(high), 2, 0)
 
 
 def cells(points: np.ndarray, close: float) -> np.ndarray:
-    """The piece of surface that each point stands for: (N, K, 3) float array of places in it.
+    """The piece of surface around each point: (N, K, 3) float array of places in it.
 
-    Where points are no farther than `close` from all neighbours, no finger comes through between them: K is 1. Where
-    they are, each stands for the surface halfway to its neighbours. The box around these places, in the frame of the
-    gripper, lies within the extent of the points: it makes the part no thicker, and leaves no gaps. Repeated points and
-    those that are not finite do not count.
+    Where points are no farther than `close` from all neighbours, no finger comes through between them: K is 1.
+    Otherwise the piece reaches halfway to the neighbours. The box around its places, in the frame of the gripper, lies
+    within the extent of the points: it makes the part no thicker, and leaves no gaps. Repeated points and those that
+    are not finite do not count.
     """
     points = np.unique(points[np.isfinite(points).all(axis=1)], axis=0)
     k = min(CELL_NEIGHBOURS, len(points) - 1)
@@ -112,7 +112,7 @@ def cells(points: np.ndarray, close: float) -> np.ndarray:
     distance, neighbour = cKDTree(points).query(points, k + 1)
     if distance.max() <= close:
         return points[:, None]
-    return (points[:, None] + points[neighbour]) / 2  # each is its own nearest
+    return (points[:, None] + points[neighbour]) / 2  # the nearest neighbour is the point itself
 
 
 def hits(
@@ -161,7 +161,7 @@ def hits_plane(
 
 
 def checked_plane(plane: Any) -> np.ndarray:
-    """The plane as a (4,) float array; InvalidParameterError if it is none."""
+    """The plane as a (4,) float array; InvalidParameterError for anything else."""
     try:
         numbers = np.asarray(plane, float).reshape(4)
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""Where a gripper with parallel jaws can take an object: candidates along its skeleton, with a free way in."""
+"""Candidates for grasps with parallel jaws along a skeleton, with a free approach."""
 
 import warnings
 from collections import Counter
@@ -94,17 +94,19 @@ def grasp_candidates(
     clearance = gripper.max_opening / 10 if clearance is None else clearance
     _check(skeleton, clearance, around, spacing, min_confidence)
     plane = None if plane is None else checked_plane(plane)
-    points = _object(skeleton, cloud)
+    points = _object_points(skeleton, cloud)
     middle = points if len(points) else skeleton.vertices
     if gripper.max_opening > UNLIKELY_OPENING * np.linalg.norm(np.ptp(middle, axis=0)):
         many = f"more than {UNLIKELY_OPENING:g} times as wide as the object is long"
         warnings.warn(f"the gripper opens {many}: are the units the same?", SkeletonWarning, stacklevel=outside())
-    place, branch, width, quality, left_out, examined = _fitting(skeleton, gripper, clearance, spacing, min_confidence)
+    place, branch, width, quality, left_out, examined = _graspable_places(
+        skeleton, gripper, clearance, spacing, min_confidence
+    )
     position, axis = place[:, :3], place[:, 3:6]
     approach = _directions_around(axis, around)
     approaches = Approaches(position, axis, approach, np.cross(axis[:, None], approach))
-    blocked, opening, depth, seen = check_approaches(approaches, points, plane, middle, gripper, width, clearance)
-    free, approaches_left_out = _without_reasons(blocked)
+    obstacles, opening, depth, seen = check_approaches(approaches, points, plane, middle, gripper, width, clearance)
+    free, blocked = _remaining(obstacles)
     quality = quality[free // around] * (seen.ravel()[free] / 3 if len(points) else 1)
     # the best of each place, then the second best of each; in each round the best first; equal ones in their order
     best = np.argsort(-quality.round(9), kind="stable")
@@ -123,19 +125,21 @@ def grasp_candidates(
         seen=seen.ravel()[free],
         gripper=gripper,
         places=examined,
-        left_out=left_out | approaches_left_out,
+        left_out=left_out | blocked,
     )
     if len(candidates) == 0:
-        why = in_words(candidates.left_out) or "the skeleton has no branch"
-        warnings.warn(f"no grasp at {examined} places: {why}", SkeletonWarning, stacklevel=outside())
+        reason = in_words(candidates.left_out) or "the skeleton has no branch"
+        warnings.warn(f"no grasp at {examined} places: {reason}", SkeletonWarning, stacklevel=outside())
     return candidates
 
 
-def _fitting(
+def _graspable_places(
     skeleton: Skeleton, gripper: Gripper, clearance: float, spacing: float | None, min_confidence: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, int], int]:
-    """Places that fit between the jaws, as of `_places_on`, the branch, width and quality of each, how many do not fit,
-    by reason, and how many were examined."""
+    """Places that fit between the jaws: as of `_places_on`, with branch, width and quality; the others are counted.
+
+    The counts are those of the rejected places, by reason, and of all examined ones.
+    """
     places = [_places_on(skeleton, path, spacing) for path in skeleton.branches]
     counts = np.array(list(map(len, places)), int)
     place, branch = np.concatenate([np.empty((0, 9)), *places]), np.repeat(np.arange(len(places)), counts)
@@ -149,14 +153,14 @@ def _fitting(
         "too wide": width + clearance > gripper.max_opening,
         "uncertain": ~(confidence >= min_confidence) if min_confidence > 0 else np.zeros(len(width), bool),
     }
-    fits, left_out = _without_reasons(reasons)
+    remaining, left_out = _remaining(reasons)
     if not counts.all():
         left_out["branches without a place between their margins"] = int((counts == 0).sum())
-    return place[fits], branch[fits], width[fits], quality[fits], left_out, len(place)
+    return place[remaining], branch[remaining], width[remaining], quality[remaining], left_out, len(place)
 
 
-def _without_reasons(reasons: dict[str, np.ndarray]) -> tuple[np.ndarray, dict[str, int]]:
-    """The rows for which no reason holds, and how often each is the first that does."""
+def _remaining(reasons: dict[str, np.ndarray]) -> tuple[np.ndarray, dict[str, int]]:
+    """The rows without a reason to reject them, and for each reason how often it is the first."""
     first = np.select([reason.ravel() for reason in reasons.values()], list(reasons), "")
     return np.flatnonzero(first == ""), dict(Counter(first[first != ""].tolist()))
 
@@ -169,8 +173,8 @@ def _places_on(skeleton: Skeleton, path: np.ndarray, spacing: float | None) -> n
     if not length > 0:
         return np.empty((0, 9))
     closed = path[0] == path[-1] and skeleton.degree[path[0]] == 2
-    usual = np.nanmedian(radii) if np.isfinite(radii).any() else 0.0
-    step = spacing or usual or length / 10
+    median_radius = np.nanmedian(radii) if np.isfinite(radii).any() else 0.0
+    step = spacing or median_radius or length / 10
     check_places(length, step)
     if closed:
         count = max(round(length / step), 1)
@@ -209,8 +213,8 @@ def _directions_around(axis: np.ndarray, n: int) -> np.ndarray:
     return np.cos(turn) * first[:, None] + np.sin(turn) * np.cross(axis, first)[:, None]
 
 
-def _object(skeleton: Skeleton, cloud: Any) -> np.ndarray:
-    """The points of the object, none if the check is left out."""
+def _object_points(skeleton: Skeleton, cloud: Any) -> np.ndarray:
+    """The points of the object, none for an empty `cloud`."""
     if isinstance(cloud, tuple | list) and len(cloud) == 0:
         return np.empty((0, 3))
     whole = skeleton.whole

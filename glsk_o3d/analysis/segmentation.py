@@ -1,4 +1,4 @@
-"""What every point of a cloud belongs to: its vertex and its branch."""
+"""The vertex and the branch of every point of a cloud."""
 
 from typing import Any
 
@@ -7,6 +7,7 @@ from scipy.spatial import cKDTree
 
 from ..data.skeleton import Skeleton, check_skeleton
 from ..errors import InvalidCloudError, InvalidParameterError
+from ..geometry.groups import Members
 from ..geometry.polylines import nearest_on_edges
 from ..geometry.vectors import finite_rows
 from ..interop.clouds import cloud_points
@@ -76,22 +77,22 @@ def vertex_of_cloud(skeleton: Skeleton, cloud: Any = None) -> tuple[np.ndarray, 
 def _nearest_vertex(skeleton: Skeleton, points: np.ndarray) -> Any:
     """The nearer end of the edge that is nearest to each point; vertices without edges count, too."""
     length = skeleton.edge_lengths.sum()
-    alone = np.flatnonzero(skeleton.degree == 0)
+    detached = np.flatnonzero(skeleton.degree == 0)
     if length == 0:
         return cKDTree(skeleton.vertices).query(points)[1]
     row, part = pieces(skeleton.vertices, skeleton.edges, length / PIECES_PER_CURVE)
-    places = np.concatenate([along(skeleton.edges, row, part, skeleton.vertices), skeleton.vertices[alone]])
+    places = np.concatenate([along(skeleton.edges, row, part, skeleton.vertices), skeleton.vertices[detached]])
     ends = np.where(part < 0.5, *skeleton.edges[row].T)
-    return np.concatenate([ends, alone])[cKDTree(places).query(points)[1]]
+    return np.concatenate([ends, detached])[cKDTree(places).query(points)[1]]
 
 
 def branch_of_edge(skeleton: Skeleton) -> np.ndarray:
     """The position in `Skeleton.branches` of every edge, (E,) int array."""
     m, none = len(skeleton.vertices), np.empty((0, 2), int)
     steps = [np.column_stack([path[:-1], path[1:]]) for path in skeleton.branches]
-    found, edges = (np.sort(pairs, axis=1) @ [m, 1] for pairs in (np.concatenate([*steps, none]), skeleton.edges))
-    branch = np.empty(len(edges), int)
-    branch[np.argsort(edges)] = np.repeat(np.arange(len(steps)), list(map(len, steps)))[np.argsort(found)]
+    keys, edge_keys = (np.sort(pairs, axis=1) @ [m, 1] for pairs in (np.concatenate([*steps, none]), skeleton.edges))
+    branch = np.empty(len(edge_keys), int)
+    branch[np.argsort(edge_keys)] = np.repeat(np.arange(len(steps)), list(map(len, steps)))[np.argsort(keys)]
     return branch
 
 
@@ -100,8 +101,8 @@ def branch_of_vertex(skeleton: Skeleton) -> np.ndarray:
     branch = np.full(len(skeleton.vertices), -1)
     branch[skeleton.edges] = branch_of_edge(skeleton)[:, None]
     branch[skeleton.junctions] = -1
-    alone = skeleton.degree == 0
-    branch[alone] = len(skeleton.branches) + np.arange(alone.sum())
+    detached = skeleton.degree == 0
+    branch[detached] = len(skeleton.branches) + np.arange(detached.sum())
     return branch
 
 
@@ -109,14 +110,12 @@ def branch_of_vertex(skeleton: Skeleton) -> np.ndarray:
 def branch_of_point(skeleton: Skeleton, points: np.ndarray, vertex: np.ndarray) -> np.ndarray:
     """`segment` for points, (N, 3) float array, whose vertices are known, (N,) int array: (N,) int64 array."""
     label: np.ndarray = np.append(branch_of_vertex(skeleton), -1)[vertex]
-    edge_branch = branch_of_edge(skeleton)
-    unsure = np.flatnonzero((vertex >= 0) & (label < 0))
-    unsure = unsure[np.argsort(vertex[unsure], kind="stable")]
-    groups = np.split(unsure, np.flatnonzero(np.diff(vertex[unsure])) + 1) if len(unsure) else []
-    for rows in groups:  # one junction each
-        around = (skeleton.edges == vertex[rows[0]]).any(axis=1)
+    edge_branch, members = branch_of_edge(skeleton), Members(vertex, len(skeleton.vertices))
+    for junction in np.intersect1d(skeleton.junctions, vertex):
+        rows = members.of(np.array([junction]))
+        around = (skeleton.edges == junction).any(axis=1)
         edges = np.flatnonzero(np.isin(edge_branch, edge_branch[around]))
         candidates = np.broadcast_to(edges, (len(rows), len(edges)))
-        edge = nearest_on_edges(skeleton.vertices, skeleton.edges, candidates, points[rows])[0]
+        edge, _ = nearest_on_edges(skeleton.vertices, skeleton.edges, candidates, points[rows])
         label[rows] = edge_branch[edge]
     return label

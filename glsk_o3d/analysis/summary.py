@@ -1,4 +1,4 @@
-"""A run in a few numbers, as the commands and the ledger of a batch tell it."""
+"""A run in a few numbers, for the commands and the ledger of a batch."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -20,7 +20,7 @@ ITERATION_COLUMNS = {
 }
 """What people read of a contraction: the field of an IterationRecord by the heading, and its format."""
 ENDING_FACTS = ("iterations", "converged", "stop_reason")
-"""What `ending` tells in one line."""
+"""The entries of `summary` that `ending` needs."""
 
 
 def summary(skeleton: Skeleton, seconds: float) -> dict[str, Any]:
@@ -51,7 +51,7 @@ def iteration_rows(records: Iterable[IterationRecord]) -> list[list[str]]:
 
 
 def ending(facts: Mapping[str, Any]) -> str | None:
-    """How a contraction ended, in a line, from what `summary` says of it; None where there was none.
+    """How a contraction ended, in a line, from its `summary`; None for a run without one.
 
     >>> ending({"iterations": 4, "converged": True, "stop_reason": "explained score settled: De = 0.01 < 0.03"})
     'converged after 4 solves'
@@ -61,12 +61,12 @@ def ending(facts: Mapping[str, Any]) -> str | None:
     n, reason = facts["iterations"], facts["stop_reason"]
     if n == 0 and reason == NOT_CONTRACTED:
         return None
-    told = f"converged after {n} solve{'s' * (n != 1)}"
-    return told if facts["converged"] else f"not {told}: {reason}"
+    words = f"converged after {n} solve{'s' * (n != 1)}"
+    return words if facts["converged"] else f"not {words}: {reason}"
 
 
 def point_count(skeleton: Skeleton) -> int:
-    """How many points the cloud has: all, where the skeleton holds a sample of them, or none; 0 if it is not known."""
+    """Number of points of the whole cloud, also if the skeleton holds a sample of them or none; 0 if it is unknown."""
     return skeleton.report.n_input or len(skeleton.points)
 
 

@@ -15,10 +15,10 @@ from .rows import Rows
 
 PIECE_LENGTH = 4.0  # derived: radii; the chord of a bend as sharp as that is 3 % too short
 TIP_QUANTILE = 0.95  # fitted: share of the points at a tip that its cylinder reaches
-OUTSIDE = 3.0  # fitted: radii aside of a tip, from which on points do not say how far it reaches
-BASE = 4.0  # derived: radii of a junction, within which a branch that leaves it by 15 degrees or more is outside
-BASE_SECTIONS = 24  # speed: places along that at which
-ON_SECTION = 32  # speed: so many points of a branch are tested
+FAR_FROM_TIP = 3.0  # fitted: radii beside a tip, from which on points belong to no end of the branch
+BASE_LENGTH = 4.0  # derived: radii of a junction, within which a branch that leaves it by 15 degrees or more is outside
+BASE_SECTIONS = 24  # speed: sections along that
+POINTS_ON_SECTION = 32  # speed: tested on each of these sections
 RADIUS_SAMPLES = 8  # derived: places along a cylinder at which its radius is taken, evenly
 
 
@@ -106,34 +106,34 @@ def cylinders(skeleton: Any, root: Any = None, up: str | None = None) -> Cylinde
         raise InvalidParameterError("the skeleton has no radii: a file of a format without them was read")
     if root is None and not skeleton.report.root:  # numbered outwards, all but the first have one neighbour before them
         root = 0 if np.array_equal(np.sort(skeleton.edges[:, 1]), np.arange(1, len(skeleton.vertices))) else None
-    up, skeleton = upward(skeleton, root, up), skeleton.whole
+    up, skeleton = up_axis(skeleton, root, up), skeleton.whole
     table, beyond = branch_table(skeleton, root), _beyond_tips(skeleton)
     last = np.full(len(table), -1)
     rows: list[tuple[Any, ...]] = []
     for row in np.argsort(table.level[: len(skeleton.branches)], kind="stable").tolist():
         path = skeleton.branches[row]
         path = path if path[0] == table.start[row] else path[::-1]
-        before = int(table.parent[row])
-        last[row] = last[before] if before >= 0 else -1
+        parent = int(table.parent[row])
+        last[row] = last[parent] if parent >= 0 else -1
         along = arc_lengths(skeleton.vertices[path])
-        leaves_parent = before >= 0 and table.order[row] > table.order[before]
-        if leaves_parent:  # of what several branches share at a junction, each part is the first one's
-            beside = (table.start == path[0]) & ((table.order == table.order[before]) | (np.arange(len(table)) < row))
-            others = [before, *np.flatnonzero(beside & (table.parent == before)).tolist()]
+        if parent >= 0 and table.order[row] > table.order[parent]:
+            # what several branches share at a junction belongs to the first one
+            beside = (table.start == path[0]) & ((table.order == table.order[parent]) | (np.arange(len(table)) < row))
+            others = [parent, *np.flatnonzero(beside & (table.parent == parent)).tolist()]
             start = _length_inside(skeleton, path, along, [skeleton.branches[other] for other in others])
         else:
             start = -beyond.get(int(path[0]), 0.0)
-            start = start if before >= 0 else _begun(skeleton, path, along, start, up)
+            start = start if parent >= 0 else _start_of_stem(skeleton, path, along, start, up)
         stop = along[-1] + beyond.get(int(path[-1]), 0.0)
         if stop <= start:
             continue
         pieces = max(round((stop - start) / (PIECE_LENGTH * max(table.mean_radius[row], 1e-3 * (stop - start)))), 1)
-        if table.confidence[row] == 0:  # of a traced one nobody knows more than its vertices
+        if table.confidence[row] == 0:  # a traced branch has no details between its vertices
             pieces = min(pieces, len(path) - 1)
         ends = np.linspace(start, stop, pieces + 1)
         places = _place_beyond(skeleton.vertices[path], along, ends)
         inside = ends[:-1, None] + np.diff(ends)[:, None] * (np.arange(RADIUS_SAMPLES) + 0.5) / RADIUS_SAMPLES
-        sides = _sides(skeleton.radii[path], along, [beyond.get(end, 0) > 0 for end in path[[0, -1]].tolist()])
+        sides = _tapered_radii(skeleton.radii[path], along, [beyond.get(end, 0) > 0 for end in path[[0, -1]].tolist()])
         radius = np.sqrt((np.interp(inside, along, sides) ** 2).mean(axis=1))
         confidence = np.interp(inside, along, skeleton.confidence[path]).mean(axis=1)
         for i in range(pieces):
@@ -145,11 +145,11 @@ def cylinders(skeleton: Any, root: Any = None, up: str | None = None) -> Cylinde
     return Cylinders(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
-def upward(skeleton: Any, root: Any, up: str | None) -> str:
-    """The axis that points up: as given, or that of the root, here or in the pipeline, or z."""
+def up_axis(skeleton: Any, root: Any, up: str | None) -> str:
+    """The axis that points up: `up`, or by default that of the root, or of that in the pipeline, or z."""
     steps = skeleton.report.recipe.get("pipeline", ())
-    grown = [root, *(step.get("root") for step in reversed(steps) if isinstance(step, dict)), "z"]
-    up = next(axis for axis in grown if isinstance(axis, str) and axis in AXES) if up is None else up
+    roots = [root, *(step.get("root") for step in reversed(steps) if isinstance(step, dict)), "z"]
+    up = next(axis for axis in roots if isinstance(axis, str) and axis in AXES) if up is None else up
     if up not in AXES:
         raise InvalidParameterError(f"up = {up!r}: must be 'x', 'y' or 'z', with a minus where that points down")
     return up
@@ -161,48 +161,48 @@ def points_near(skeleton: Any) -> np.ndarray:
     np.maximum.at(longest, skeleton.edges, skeleton.edge_lengths[:, None])
     owned = np.flatnonzero(owner >= 0)
     distance = norm(skeleton.points[owned] - skeleton.vertices[owner[owned]])
-    return owned[distance <= (OUTSIDE * skeleton.radii + longest)[owner[owned]]]
+    return owned[distance <= (FAR_FROM_TIP * skeleton.radii + longest)[owner[owned]]]
 
 
-def lowest_around(points: np.ndarray, foot: np.ndarray, onward: np.ndarray, radius: float, up: str) -> float:
-    """How high the lowest point within three radii of the foot of a stem is; if it leads down, how high the foot is."""
-    height, ahead = along_axis(np.array([foot, onward]), up)
-    low = along_axis(points[norm(points - foot) <= OUTSIDE * radius], up)
-    return float(low.min() if len(low) and ahead > height - OUTSIDE * radius else height)
+def ground_height(points: np.ndarray, foot: np.ndarray, end: np.ndarray, radius: float, up: str) -> float:
+    """Height of the lowest point within three radii of the foot of a stem; that of the foot if the stem leads down."""
+    height, end_height = along_axis(np.array([foot, end]), up)
+    low = along_axis(points[norm(points - foot) <= FAR_FROM_TIP * radius], up)
+    return float(low.min() if len(low) and end_height > height - FAR_FROM_TIP * radius else height)
 
 
-def _begun(skeleton: Any, path: np.ndarray, along: np.ndarray, start: float, up: str) -> float:
+def _start_of_stem(skeleton: Any, path: np.ndarray, along: np.ndarray, start: float, up: str) -> float:
     """The first length along a stem, from a start on, at which it is as high as the lowest point there."""
     curve, lengths = skeleton.vertices[path], np.append(start, along[along > start])
-    lowest = lowest_around(skeleton.points[points_near(skeleton)], curve[0], curve[-1], skeleton.radii[path[0]], up)
+    lowest = ground_height(skeleton.points[points_near(skeleton)], curve[0], curve[-1], skeleton.radii[path[0]], up)
     height = along_axis(_place_beyond(curve, along, lengths), up)
     k = int(np.argmax(height >= lowest))
     return float(np.interp(lowest, height[k - 1 : k + 1], lengths[k - 1 : k + 1])) if k else start
 
 
-def _sides(radii: np.ndarray, along: np.ndarray, free: list[bool]) -> np.ndarray:
-    """The radii along a branch; near its free ends, where a face has a say in them, as the taper behind has them."""
+def _tapered_radii(radii: np.ndarray, along: np.ndarray, free: list[bool]) -> np.ndarray:
+    """The radii along a branch; near its free ends, where they depend on the face, the taper behind continues."""
     radii = radii.copy()
     for side, is_free in zip((slice(None), slice(None, None, -1)), free, strict=True):
-        away, radius = np.abs(along - along[side][0])[side], radii[side]
+        distance, radius = np.abs(along - along[side][0])[side], radii[side]
         reach = min(radius[1], along[-1] / (1 + PIECE_LENGTH))
         if is_free and reach > 0:
-            there, behind = np.interp([reach, (1 + PIECE_LENGTH) * reach], away, radius)
-            close = away < reach
-            taper = (there - behind) / (PIECE_LENGTH * reach)
-            radius[close] = np.clip(there + taper * (reach - away[close]), there / 2, 2 * there)
+            at_reach, behind = np.interp([reach, (1 + PIECE_LENGTH) * reach], distance, radius)
+            close = distance < reach
+            taper = (at_reach - behind) / (PIECE_LENGTH * reach)
+            radius[close] = np.clip(at_reach + taper * (reach - distance[close]), at_reach / 2, 2 * at_reach)
     return radii
 
 
 def _length_inside(skeleton: Any, path: np.ndarray, along: np.ndarray, others: list[np.ndarray]) -> float:
     """Length of the base of a branch that is inside other branches of its junction, averaged over its section."""
-    length = min(along[-1], BASE * skeleton.radii[path[0]])
+    length = min(along[-1], BASE_LENGTH * skeleton.radii[path[0]])
     lengths = length * (np.arange(BASE_SECTIONS) + 0.5) / BASE_SECTIONS
     places = place_at(skeleton.vertices[path], along, lengths)
     beyond = np.maximum(lengths, skeleton.radii[path[0]])  # nearer to the junction radii are those of the junction
     radius = np.interp(beyond, along, skeleton.radii[path])
-    turn = np.pi * (3 - np.sqrt(5)) * np.arange(ON_SECTION)  # a sunflower's, which fills a disc evenly
-    disc = np.sqrt((np.arange(ON_SECTION) + 0.5) / ON_SECTION) * np.stack([np.cos(turn), np.sin(turn)])
+    turn = np.pi * (3 - np.sqrt(5)) * np.arange(POINTS_ON_SECTION)  # a sunflower's seeds fill a disc evenly
+    disc = np.sqrt((np.arange(POINTS_ON_SECTION) + 0.5) / POINTS_ON_SECTION) * np.stack([np.cos(turn), np.sin(turn)])
     axes = plane_axes(unit(np.gradient(places, axis=0)))
     points = places[:, None] + (radius[:, None, None] * (axes @ disc)).swapaxes(1, 2)
     near = []
@@ -215,9 +215,10 @@ def _length_inside(skeleton: Any, path: np.ndarray, along: np.ndarray, others: l
 
 
 def _beyond_tips(skeleton: Any) -> dict[int, float]:
-    """How far a cylinder goes on beyond every tip of the curve, by vertex, so that it has the volume of the end there.
+    """Length of a cylinder beyond every tip of the curve, by vertex, that accounts for the volume of the end.
 
-    By its points the end is half a radius beyond the tip if it is flat, and one if it is round, with two thirds of it.
+    The points reach half a radius beyond the tip if the end is flat, and one if it is round, with two thirds of the
+    volume.
     """
     ends = np.concatenate([skeleton.edges, skeleton.edges[:, ::-1]])
     ends = ends[skeleton.degree[ends[:, 0]] == 1]
@@ -229,15 +230,15 @@ def _beyond_tips(skeleton: Any) -> dict[int, float]:
         if len(points) and step.any():
             offset, direction = points - skeleton.vertices[tip], step / np.linalg.norm(step)
             along = offset @ direction
-            aside = norm(offset - along[:, None] * direction)
-            reach = np.quantile(along[aside <= max(OUTSIDE * skeleton.radii[beside], aside.min())], TIP_QUANTILE)
+            across = norm(offset - along[:, None] * direction)
+            reach = np.quantile(along[across <= max(FAR_FROM_TIP * skeleton.radii[beside], across.min())], TIP_QUANTILE)
             half = skeleton.radii[beside] / 2
             beyond[tip] = max(float(reach - 2 / 3 * np.clip(reach - half, 0, half)), 0.0)
     return beyond
 
 
 def _place_beyond(curve: np.ndarray, along: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """The places so far along a curve, which goes straight on at both ends."""
+    """The places at lengths along a curve that goes straight on at both ends, (k, 3) float array."""
     backward, forward = unit(curve[[0, -1]] - curve[[1, -2]])
     places = place_at(curve, along, lengths) + np.maximum(-lengths, 0)[:, None] * backward
     return places + np.maximum(lengths - along[-1], 0)[:, None] * forward
