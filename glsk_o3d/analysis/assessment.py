@@ -1,4 +1,4 @@
-"""How a skeleton lies in its cloud, without knowing the truth."""
+"""How well a skeleton fits its cloud, without a known axis."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ MIN_SECTION_POINTS = 6  # fitted: below which a place counts as outside
 # fitted: without points in so wide an angle a place is outside; a scan from one side leaves a little over pi open
 OPEN_ANGLE = 4 * np.pi / 3
 POINTS_PER_SECTION, MOST_SECTIONS = 24, 1000  # fitted: points on average, and sections of a skeleton at most
-# fitted: times the median distance of a section's points: those farther belong to no tube around the curve
+# fitted: times the median distance of a section's points; those farther away belong to no tube around the curve
 FAR_FROM_SECTION = 3.0
 # derived: least variance of an outline across itself over that along it: arcs below about 130 degrees have less
 MIN_ARC_VARIANCE = 0.1
@@ -101,7 +101,7 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
         raise InvalidParameterError("the skeleton has no edge with a length: there is no curve to assess")
     if len(cloud) > 1:
         check_extent(cloud)
-    check_extent(np.concatenate([cloud, skeleton.vertices]))  # a point may be so far off that no place is near
+    check_extent(np.concatenate([cloud, skeleton.vertices]))  # also of a single point far from the skeleton
     reach, clusters = _neighbourhood(cloud)
     sections = cross_sections(skeleton.vertices, skeleton.branches, cloud, shortest=reach)
     occupied = sections.counts >= MIN_SECTION_POINTS
@@ -144,14 +144,14 @@ def _neighbourhood(cloud: np.ndarray) -> tuple[float, int]:
 
 
 class Sections(NamedTuple):
-    """What the cloud looks like around S pieces of a skeleton, all of about one length: arrays with a row for each."""
+    """Sections of a cloud around S pieces of a skeleton, all of about one length: arrays with a row for each."""
 
     places: np.ndarray  # (S, 3): the middles of the pieces
     lengths: np.ndarray
-    counts: np.ndarray  # of points; where there are few, the other values mean little
+    counts: np.ndarray  # of points; with few of them the other values mean little
     offsets: np.ndarray  # from the place to the centre of the section
     radii: np.ndarray  # root mean square distance from the points to the centre: the radius of a round tube
-    open_angles: np.ndarray  # radians in which the place sees no points: the sum of the gaps of more than a right angle
+    open_angles: np.ndarray  # radians without points as seen from the place: sum of gaps of more than a right angle
 
 
 def cross_sections(vertices: Floats, branches: Sequence[Ints], points: Floats, shortest: float = 0.0) -> Sections:
@@ -185,32 +185,31 @@ def cross_sections(vertices: Floats, branches: Sequence[Ints], points: Floats, s
     centre = mean + np.einsum("sij,sj->si", np.linalg.pinv(spread, rcond=MIN_ARC_VARIANCE, hermitian=True), skew) / 2
     squared = group_sum(((q - centre[section]) ** 2).sum(axis=1), section, n) / total
     offsets, radii = size * np.linalg.norm(centre, axis=1), size * np.sqrt(squared)
-    return Sections(places, lengths, count, offsets, radii, _open(q, section, n))
+    return Sections(places, lengths, count, offsets, radii, _open_angles(q, section, n))
 
 
 def _cut(vertices: Floats, branches: Sequence[Ints], n_points: int, shortest: float) -> tuple[Floats, Floats, Floats]:
     """Places, unit tangents and lengths of the pieces that the branches are cut into."""
     along = [arc_lengths(vertices[path]) for path in branches]
-    total = sum(travelled[-1] for travelled in along)
+    total = sum(arc_length[-1] for arc_length in along)
     step = max(total / np.clip(n_points // POINTS_PER_SECTION, 1, MOST_SECTIONS), shortest)
     cuts, middles, lengths = [], [], []
-    for path, travelled in zip(branches, along, strict=True):
-        if travelled[-1] == 0:
+    for path, arc_length in zip(branches, along, strict=True):
+        if arc_length[-1] == 0:
             continue
-        pieces = max(1, round(travelled[-1] / step))
-        at = np.linspace(0, travelled[-1], 2 * pieces + 1)
-        curve = place_at(vertices[path], travelled, at)
+        pieces = max(1, round(arc_length[-1] / step))
+        curve = place_at(vertices[path], arc_length, np.linspace(0, arc_length[-1], 2 * pieces + 1))
         middles.append(curve[1::2])
         cuts.append(curve[2::2] - curve[:-1:2])
-        lengths.append(np.full(pieces, travelled[-1] / pieces))
+        lengths.append(np.full(pieces, arc_length[-1] / pieces))
     chord = np.concatenate(cuts)
     size = np.linalg.norm(chord, axis=1, keepdims=True)
-    # a piece that comes back to where it began, such as a whole small loop, has no direction of its own
+    # a closed piece, such as a whole small loop, has no direction of its own
     tangent = np.where(size > 0, chord / np.where(size > 0, size, 1), [0.0, 0.0, 1.0])
     return np.concatenate(middles), tangent, np.concatenate(lengths)
 
 
-def _open(q: np.ndarray, section: np.ndarray, n: int) -> np.ndarray:
+def _open_angles(q: np.ndarray, section: np.ndarray, n: int) -> np.ndarray:
     """Sum of the gaps wider than a right angle between the directions to the points of each group."""
     angle = np.arctan2(q[:, 1], q[:, 0])
     order = np.lexsort((angle, section))

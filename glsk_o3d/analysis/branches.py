@@ -1,4 +1,4 @@
-"""The branches of a skeleton, measured one by one: a row of measures for each."""
+"""The branches of a skeleton: a row of measures for each."""
 
 import heapq
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from .rows import Rows
 from .segmentation import branch_of_edge, branch_of_point
 
 HEADING_LENGTH = 4.0  # fitted: radii of a junction over which a branch has its direction; where nearer, parts blend
-HEADING_PLACES = 65  # precision: along the half of a branch, at which it is seen where it has left the others
+HEADING_PLACES = 65  # precision: along the half of a branch, each inside or outside the other branches
 FAIR_SHARE = 0.3  # fitted: of the greatest growth length at a junction; on conifers, and plants with long leaves
 PRINTED_COLUMNS = (
     *("branch", "kind", "parent", "level", "axis", "order", "length", "mean_radius", "start_radius", "end_radius"),
@@ -40,7 +40,7 @@ class BranchTable(Rows, row="branch"):
         junctions, ``"isolated"`` for a vertex without edges.
     component : (B,) int array
     parent, level : (B,) int arrays
-        The row of the branch that it grows from, on the shortest way from the root, or -1 at the root; steps from the
+        The row of the branch that it grows from, on the shortest path from the root, or -1 at the root; steps from the
         root.
     start, end, start_point, end_point : (B,) int and (B, 3) float arrays
         Vertices at the ends, `start` towards the root, and their coordinates.
@@ -193,7 +193,7 @@ def _grow(
     ends = [(int(path[0]), int(path[-1])) for path in paths]
     parent, level, backwards = np.full(len(paths), -1), np.full(len(paths), -1), np.zeros(len(paths), bool)
     component = skeleton.component_of_vertex[[pair[0] for pair in ends]]
-    queue: list[tuple[float, int, int]] = []  # distance, vertex, and the path that leads there
+    queue: list[tuple[float, int, int]] = []  # distance, vertex, and the path that leads to it
     for part in range(skeleton.n_components):
         if chosen is not None and skeleton.component_of_vertex[chosen] == part:
             if chosen in at:
@@ -226,15 +226,15 @@ def _grow(
 
 
 def _axes(parent: Ints, level: Ints, start: Ints, angle: Floats, radius: Floats, length: Floats) -> tuple[Ints, Ints]:
-    """First row of every row's axis, and the axes before it: of those that begin in one place, one goes on.
+    """First row of every row's axis, and its order: of the branches that begin in one place, one continues the axis.
 
-    What lies beyond comes first: those stay behind that have no fair share of the greatest growth length, their own and
-    that of all that grows from them (Hackenberg et al. 2015, SimpleTree, https://doi.org/10.3390/f6114245). So a spur,
-    or a thick limb that soon ends, ends no stem. One alone goes on wherever it turns; of several the thick and
-    straight one does.
+    Branches without a fair share of the greatest growth length are excluded first; that is their own length and that of
+    all that grows from them (Hackenberg et al. 2015, SimpleTree, https://doi.org/10.3390/f6114245). So a spur, or a
+    thick limb that soon ends, does not continue a stem. A single remaining branch continues the axis wherever it turns;
+    of several the thick and straight one does.
     """
     growth = np.array(length, float)
-    for row in np.argsort(-level, kind="stable").tolist():  # those farthest from the root first
+    for row in np.argsort(-level, kind="stable").tolist():  # children before their parents
         if parent[row] >= 0:
             growth[parent[row]] += growth[row]
     _, fork = np.unique([parent, start], axis=1, return_inverse=True)
@@ -244,17 +244,17 @@ def _axes(parent: Ints, level: Ints, start: Ints, angle: Floats, radius: Floats,
     fair = growth >= FAIR_SHARE * greatest[fork]
     straight = np.where(fair, np.cos(np.radians(angle)), 0)
     straight[fair & np.isfinite(angle) & (np.bincount(fork, fair)[fork] == 1)] = 1
-    unknown = np.isin(fork, fork[(straight > 0) & np.isnan(radius)])  # there the angle alone decides
-    onward = np.nan_to_num(straight * np.where(unknown, 1, radius))
-    chosen = np.empty(len(onward), int)
-    rows = np.lexsort((-np.arange(len(onward)), onward))
-    chosen[fork[rows]] = rows  # the last one stays
-    goes_on = (chosen[fork] == np.arange(len(onward))) & (onward > 0)
+    unknown = np.isin(fork, fork[(straight > 0) & np.isnan(radius)])  # without a radius the angle alone decides
+    score = np.nan_to_num(straight * np.where(unknown, 1, radius))
+    best = np.empty(len(score), int)
+    rows = np.lexsort((-np.arange(len(score)), score))
+    best[fork[rows]] = rows  # the last value counts
+    continues = (best[fork] == np.arange(len(score))) & (score > 0)
     axis, order = np.arange(len(parent)), np.zeros(len(parent), int)
     for row in np.argsort(level, kind="stable").tolist():
-        before = parent[row]
-        if before >= 0:
-            axis[row], order[row] = (axis[before], order[before]) if goes_on[row] else (row, order[before] + 1)
+        p = parent[row]
+        if p >= 0:
+            axis[row], order[row] = (axis[p], order[p]) if continues[row] else (row, order[p] + 1)
     return axis, order
 
 
@@ -274,24 +274,26 @@ def _kinds(skeleton: Skeleton, paths: list[np.ndarray]) -> np.ndarray:
 
 
 def _angle(skeleton: Skeleton, paths: list[np.ndarray], at: dict[int, list[int]], row: int, parent: int) -> Any:
-    """Degrees by which a path turns away from its parent, NaN where there is none or one of them is closed."""
-    path, before = paths[row], paths[parent]
-    if parent < 0 or path[0] == path[-1] or before[0] == before[-1]:
+    """Degrees by which a path turns away from its parent, NaN without a parent or if one of them is closed."""
+    path, parent_path = paths[row], paths[parent]
+    if parent < 0 or path[0] == path[-1] or parent_path[0] == parent_path[-1]:
         return np.nan
     limbs = {k: paths[k] if paths[k][0] == path[0] else paths[k][::-1] for k in at[int(path[0])]}
-    leaves, arrives = (
-        sign * _heading(skeleton, limbs[k], [limb for other, limb in limbs.items() if other != k])
-        for k, sign in ((row, 1), (parent, -1))
-    )
-    if not (leaves.any() and arrives.any()):
+
+    def heading(k: int) -> Floats:
+        return _heading(skeleton, limbs[k], [limb for other, limb in limbs.items() if other != k])
+
+    direction, parent_direction = heading(row), -heading(parent)
+    if not (direction.any() and parent_direction.any()):
         return np.nan
-    return np.degrees(np.arctan2(np.linalg.norm(np.cross(leaves, arrives)), leaves @ arrives))
+    sine = np.linalg.norm(np.cross(direction, parent_direction))
+    return np.degrees(np.arctan2(sine, direction @ parent_direction))
 
 
-def _heading(skeleton: Skeleton, path: np.ndarray, others: list[np.ndarray]) -> np.ndarray:
-    """Where a limb goes from its junction, over four radii of that from where its section has left the other limbs.
+def _heading(skeleton: Skeleton, path: np.ndarray, others: list[np.ndarray]) -> Floats:
+    """Direction of a limb from its junction, over four radii of that from the place where it has left the other limbs.
 
-    Of a short one that is its half, and without radii over the first quarter.
+    That place is no farther than the half of the limb; without radii the direction is that of the first quarter.
     """
     curve, radius = skeleton.vertices[path], skeleton.radii[path[0]]
     along = arc_lengths(curve)

@@ -129,10 +129,11 @@ def compare(skeleton: Skeleton, truth: Any) -> Comparison:
     True
     """
     check_skeleton(skeleton)
+    none = np.empty(0)
     if not isinstance(truth, Truth):
-        nodes = truth.vertices if isinstance(truth, Skeleton) else getattr(truth, "nodes", ())
-        truth = Truth(nodes, getattr(truth, "edges", ()), getattr(truth, "radii", ()))
-    axis = Skeleton(truth.nodes, simple_edges(truth.edges), truth.radii, (), (), ())
+        nodes = truth.vertices if isinstance(truth, Skeleton) else getattr(truth, "nodes", none)
+        truth = Truth(nodes, getattr(truth, "edges", none), getattr(truth, "radii", none))
+    axis = Skeleton(truth.nodes, simple_edges(truth.edges), truth.radii, none, none, none)
     if len(skeleton.vertices) == 0:
         raise InvalidParameterError("the skeleton is empty: there is nothing to compare")
     step = PLACE_SPACING * np.median(truth.radii)

@@ -1,4 +1,4 @@
-"""The armature of a skeleton for animation: where its joints are, and which bones move each point of a surface."""
+"""The armature of a skeleton for animation: its joints, and the bones that move each point of a surface."""
 
 import itertools
 from typing import Any
@@ -29,25 +29,30 @@ def armature(forest: Skeleton) -> Skeleton:
     """
     whole, root = _without_junctions_in_balls(forest)
     radii, ends = np.nan_to_num(whole.radii), whole.degree != 2
-    into = np.where(ends, np.cumsum(ends) - 1, -1)  # which joint each vertex goes with
-    places, thick, edges, n = [whole.vertices[ends]], [whole.radii[ends]], [np.empty((0, 2), int)], int(ends.sum())
+    joint = np.where(ends, np.cumsum(ends) - 1, -1)  # of each vertex
+    places, joint_radii, edges, n = (
+        [whole.vertices[ends]],
+        [whole.radii[ends]],
+        [np.empty((0, 2), int)],
+        int(ends.sum()),
+    )
     for path in whole.branches:
         lengths = arc_lengths(whole.vertices[path])
         at = _joints_along(whole.vertices[path], radii[path], whole.degree[path[[0, -1]]] > 2, path == root)
-        number = np.concatenate([into[path[:1]], n + np.arange(len(at) - 2), into[path[-1:]]])
-        into[path[1:-1]] = number[np.searchsorted((at[1:] + at[:-1]) / 2, lengths[1:-1])]
+        number = np.concatenate([joint[path[:1]], n + np.arange(len(at) - 2), joint[path[-1:]]])
+        joint[path[1:-1]] = number[np.searchsorted((at[1:] + at[:-1]) / 2, lengths[1:-1])]
         places.append(place_at(whole.vertices[path], lengths, at[1:-1]))
-        thick.append(np.interp(at[1:-1], lengths, whole.radii[path]))
+        joint_radii.append(np.interp(at[1:-1], lengths, whole.radii[path]))
         edges.append(np.sort(np.column_stack([number[:-1], number[1:]]), axis=1))
         n += len(at) - 2
-    vertex = np.append(into, -1)[whole.vertex_of_point]
-    joints, radii = np.concatenate(places), np.concatenate(thick)
-    thinned = Skeleton(joints, np.concatenate(edges), radii, vertex, whole.points, whole.normals)
-    return numbered_from(thinned, int(into[root]))
+    vertex = np.append(joint, -1)[whole.vertex_of_point]
+    joints, radii = np.concatenate(places), np.concatenate(joint_radii)
+    jointed = Skeleton(joints, np.concatenate(edges), radii, vertex, whole.points, whole.normals)
+    return numbered_from(jointed, int(joint[root]))
 
 
 def _without_junctions_in_balls(forest: Skeleton) -> tuple[Skeleton, int]:
-    """Without branches that join a junction to another in whose ball they are, and what vertex 0 has become."""
+    """Without branches from a junction to another in whose ball they are; and the vertex that replaces vertex 0."""
     root = 0
     while True:
         radii, group, inside = np.nan_to_num(forest.radii), np.arange(len(forest.vertices)), []
@@ -68,38 +73,38 @@ def _without_junctions_in_balls(forest: Skeleton) -> tuple[Skeleton, int]:
 
 
 def _joints_along(curve: np.ndarray, radii: np.ndarray, forks: np.ndarray, kept: np.ndarray) -> np.ndarray:
-    """How far along a branch its joints are, its ends and the vertices `kept` among them, (k,) float array."""
+    """Lengths along a branch of its joints, with its ends and the vertices `kept` among them, (k,) float array."""
     lengths = arc_lengths(curve)
-    low = _leaves_ball(curve, radii[0]) if forks[0] else 0.0
-    high = lengths[-1] - (_leaves_ball(curve[::-1], radii[-1]) if forks[1] else 0.0)
+    low = _length_in_ball(curve, radii[0]) if forks[0] else 0.0
+    high = lengths[-1] - (_length_in_ball(curve[::-1], radii[-1]) if forks[1] else 0.0)
     inner = np.array([low, high])[forks] if low <= high else []
     if low <= high and high - low < np.interp((low + high) / 2, lengths, radii):  # no room for a bone in between
         inner = [(low + high) / 2] if forks.all() else []
     fixed = np.unique([*lengths[[0, -1]], *inner, *lengths[kept]])
     joints = [fixed[0]]
-    for here, there in itertools.pairwise(fixed):
-        if low <= here and there <= high:
-            for at, radius in zip(lengths, radii, strict=True):
-                if joints[-1] < at < there and joints[-1] + radius <= at <= there - radius:
-                    joints.append(at)
-        joints.append(there)
+    for start, end in itertools.pairwise(fixed):
+        if low <= start and end <= high:
+            for length, radius in zip(lengths, radii, strict=True):
+                if joints[-1] < length < end and joints[-1] + radius <= length <= end - radius:
+                    joints.append(length)
+        joints.append(end)
     return np.array(joints)
 
 
-def _leaves_ball(curve: np.ndarray, radius: float) -> Any:
-    """How far along a curve it leaves the ball around its first place; infinite if it never does."""
-    away = curve - curve[0]
-    outside = np.flatnonzero(norm(away) > radius)
+def _length_in_ball(curve: np.ndarray, radius: float) -> Any:
+    """Length of a curve up to where it leaves the ball around its first place; infinite if it never does."""
+    offset = curve - curve[0]
+    outside = np.flatnonzero(norm(offset) > radius)
     if len(outside) == 0:
         return np.inf
-    start, step = away[outside[0] - 1], away[outside[0]] - away[outside[0] - 1]
+    start, step = offset[outside[0] - 1], offset[outside[0]] - offset[outside[0] - 1]
     before, size = start @ step, norm(step)
     root = np.sqrt(before**2 - size**2 * (start @ start - radius**2))
     return arc_lengths(curve)[outside[0] - 1] + (root - before) / size
 
 
 def skin_weights(forest: Skeleton, points: np.ndarray, vertex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which bones move each point, and how much, for linear blend skinning: (N, 4) int and (N, 4) float array.
+    """The bones that move each point, and their weights, for linear blend skinning: (N, 4) int and (N, 4) float array.
 
     The forest has no loops and is numbered from its roots outwards; each edge is a bone, a row of `forest.edges`, with
     its joint at the end that is nearer to the root. `vertex`, (N,), says which part of the curve a point is on. The
@@ -111,18 +116,18 @@ def skin_weights(forest: Skeleton, points: np.ndarray, vertex: np.ndarray) -> tu
     own, _ = nearest_on_edges(forest.vertices, forest.edges, around[vertex], points)
     own, along = nearest_on_edges(forest.vertices, forest.edges, table[own], points)  # the vertex may be another part's
     bones = table[own]
-    far = np.stack([_squared_distance(forest, np.where(bone < 0, own, bone), points) for bone in bones.T], axis=1)
-    far[bones < 0] = np.inf
-    least = far.min(axis=1, keepdims=True)
-    thick = forest.radii[forest.edges[own]]
-    radius = (thick[:, 0] + along * (thick[:, 1] - thick[:, 0]))[:, None]
-    order = np.argsort(far, axis=1, kind="stable")[:, : MOST_WEIGHTS + 1]
-    bones, far = (np.take_along_axis(each, order, axis=1) for each in (bones, far))
-    fifth = far[:, MOST_WEIGHTS:].min(axis=1, initial=np.inf, keepdims=True)
+    squared = np.stack([_squared_distance(forest, np.where(bone < 0, own, bone), points) for bone in bones.T], axis=1)
+    squared[bones < 0] = np.inf
+    least = squared.min(axis=1, keepdims=True)
+    start, end = forest.radii[forest.edges[own]].T
+    radius = (start + along * (end - start))[:, None]
+    order = np.argsort(squared, axis=1, kind="stable")[:, : MOST_WEIGHTS + 1]
+    bones, squared = (np.take_along_axis(values, order, axis=1) for values in (bones, squared))
+    fifth = squared[:, MOST_WEIGHTS:].min(axis=1, initial=np.inf, keepdims=True)
     reach = np.minimum(2 * BLEND**2 * np.fmax(radius**2, least), fifth - least)
     # on a tube at s beyond the joint the squares of the distances are r^2 + 2 s^2 and r^2: what counts is (s / r)^2
-    share = np.clip(1 - (far - least) / np.maximum(reach, TINY), 0, 1) ** 2
-    bones, share = (np.pad(each, ((0, 0), (0, MOST_WEIGHTS)))[:, :MOST_WEIGHTS] for each in (bones, share))
+    share = np.clip(1 - (squared - least) / np.maximum(reach, TINY), 0, 1) ** 2
+    bones, share = (np.pad(values, ((0, 0), (0, MOST_WEIGHTS)))[:, :MOST_WEIGHTS] for values in (bones, share))
     return np.where(share > 0, bones, 0), share / share.sum(axis=1, keepdims=True)
 
 
@@ -147,9 +152,9 @@ def _squared_distance(forest: Skeleton, bone: np.ndarray, points: np.ndarray) ->
     # else all bones of a joint would be equally near behind it, also those that point away
     _, along = nearest_on_edges(forest.vertices, forest.edges, bone[:, None], points)
     start, end = forest.vertices[forest.edges[bone]].swapaxes(0, 1)
-    away, axis = points - start - along[:, None] * (end - start), end - start
-    beyond = (away * axis).sum(axis=1) / np.maximum(norm(axis), TINY)
-    return (away**2).sum(axis=1) + beyond**2
+    offset, axis = points - start - along[:, None] * (end - start), end - start
+    beyond = (offset * axis).sum(axis=1) / np.maximum(norm(axis), TINY)
+    return (offset**2).sum(axis=1) + beyond**2
 
 
 def bone_before(forest: Skeleton) -> np.ndarray:
@@ -160,7 +165,7 @@ def bone_before(forest: Skeleton) -> np.ndarray:
 
 
 def bone_names(forest: Skeleton) -> list[str]:
-    """Of each bone: its branch, and which one of that it is."""
+    """Names of the bones, of their branch and their number on it."""
     branch = branch_of_edge(forest)
     numbers = group_rank(branch, len(forest.branches)).tolist()
     return [f"branch_{label}.{number:03d}" for label, number in zip(branch.tolist(), numbers, strict=True)]

@@ -1,4 +1,4 @@
-"""Support by resampling: which branches, loops and ends do skeletons of other samples of the object show?"""
+"""Support by resampling: the share of samples whose skeletons show each branch, loop and end."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ from ..pipeline import Pipeline
 from .comparison import matched
 from .curves import places_along
 
-SAMPLE_SHARE = 0.8  # fitted: of the points in each sample; halves doubt more that is right
+SAMPLE_SHARE = 0.8  # fitted: of the points in each sample; halves doubt more parts that are right
 NEAR = 1.0  # fitted: local radii within which a curve shows a place of another
 NEAR_END = 2.0  # fitted: and an end another end
-MOST_OF_IT = 0.9  # fitted: share of the vertices of a branch that must be shown
+SHOWN_SHARE = 0.9  # fitted: share of the vertices of a branch that must be shown
 NEAR_LOOP = 1.5  # fitted: and a loop another loop: all around it
-STEP = 0.25  # derived: radii between places of a curve: what is a radius away is known to a hundredth
+STEP = 0.25  # derived: radii between places of a curve: distances of a radius are exact to a hundredth
 MOST_PIECES = 1000  # derived: of an edge, where radii are near nothing
 WORTH_A_WARNING = 0.7  # fitted: share of samples with the same graph up to which a skeleton is uncertain
 
 _Missing: TypeAlias = tuple[str, int, np.ndarray, float]
-"""What a sample shows and the skeleton lacks: what it is, the sample's number, the place, and how near is the same."""
+"""A part that a sample shows and the skeleton lacks: its kind, the sample's number, the place, and its reach."""
 
 
 def support(
@@ -106,7 +106,7 @@ def with_support(
     seed: int = 0,
     on_draw: Callable[[int, int], object] | None = None,
 ) -> Skeleton:
-    """A skeleton that a pipeline made, and which part of it the skeletons of samples of its points show.
+    """The skeleton of a pipeline, with the share of samples of its points whose skeletons show each part.
 
     The other arguments are those of `support`.
     """
@@ -123,7 +123,7 @@ def with_support(
             warnings.simplefilter("ignore", SkeletonWarning)
             try:
                 others.append(pipeline(points[rows]))
-            except InvalidCloudError:  # too few points are left: they show nothing
+            except InvalidCloudError:  # too few points: they show nothing
                 others.append(Skeleton((), (), (), (), (), ()))  # type: ignore[arg-type]
     return of_input(_supported(whole, others))
 
@@ -131,13 +131,13 @@ def with_support(
 def _supported(skeleton: Skeleton, others: list[Skeleton]) -> Skeleton:
     """A skeleton with the share of others that show each part of it."""
     whole, curves = _Curve(skeleton), [_Curve(other) for other in others]
-    near = np.array([curve.shows(whole.vertices, NEAR * whole.reach) for curve in curves])
+    near = np.array([curve.shows(whole.vertices, NEAR * whole.reach) for curve in curves])  # (samples, M)
     supported = []
     for branch in skeleton.branches:
         path = skeleton.vertices[branch]
         lengths = arc_lengths(path)
         shares = near[:, branch].mean(axis=1)
-        supported.append(_part("branch", place_at(path, lengths, lengths[-1] / 2), np.mean(shares >= MOST_OF_IT)))
+        supported.append(_part("branch", place_at(path, lengths, lengths[-1] / 2), np.mean(shares >= SHOWN_SHARE)))
     for loop in whole.loops:
         shares = [curve.shows_loop(whole, loop) for curve in curves]
         supported.append(_part("loop", whole.vertices[loop].mean(axis=0), np.mean(shares)))
@@ -180,9 +180,9 @@ def _lacking(missing: list[_Missing], draws: int) -> Iterator[Supported]:
         near = cdist(place, place) <= np.maximum(reach[:, None], reach)
         group = component_labels(len(place), np.argwhere(near))
         for number in range(group.max() + 1):
-            these = group == number
-            share = len(np.unique(draw[these])) / draws
-            yield _part(about, place[these].mean(axis=0), share, present=False)
+            members = group == number
+            share = len(np.unique(draw[members])) / draws
+            yield _part(about, place[members].mean(axis=0), share, present=False)
 
 
 class _Curve:
@@ -202,7 +202,7 @@ class _Curve:
         return self._places.query(places)[0] <= reach
 
     def shows_loop(self, other: _Curve, loop: np.ndarray) -> bool:
-        """Whether what lies along a loop of another curve closes a loop, too, that comes along most of it."""
+        """Whether the part of this curve near a loop of another one has a loop, too, along most of it."""
         around = cKDTree(other.vertices[loop])
         distance, nearest = around.query(self.vertices)
         near = distance <= NEAR_LOOP * other.reach[loop][nearest]
@@ -212,4 +212,4 @@ class _Curve:
             return False
         closed = cKDTree(self.vertices[np.unique(np.concatenate(cycles))])
         along_it = closed.query(other.vertices[loop])[0] <= NEAR_LOOP * other.reach[loop]
-        return bool(along_it.mean() >= MOST_OF_IT)
+        return bool(along_it.mean() >= SHOWN_SHARE)

@@ -176,7 +176,7 @@ def _check_head(recipe: Any) -> None:
 def _part(table: Any, path: str, role: str) -> Parameters:
     """A filter, reducer or rule from its table."""
     kind = "rule" if role == "stop" else "filter"
-    _refuse_gap(table, path)
+    _check_written(table, path)
     if not isinstance(table, dict) or kind not in table:
         raise RecipeError(f'{path}: must be a table such as {{"{kind}": NAME, ...}}, not {shown(table)}')
     name = table[kind]
@@ -195,7 +195,7 @@ def _part(table: Any, path: str, role: str) -> Parameters:
     return part
 
 
-def _refuse_gap(value: Any, path: str) -> None:
+def _check_written(value: Any, path: str) -> None:
     if isinstance(value, dict) and UNWRITTEN in value:
         raise RecipeError(f"{path}: a recipe cannot hold it: {value[UNWRITTEN]}")
 
@@ -208,7 +208,7 @@ def _values(cls: type[Parameters], table: dict[str, Any], path: str) -> dict[str
         if name not in fields:
             hint = did_you_mean(str(name), fields, f"parameter of {cls.__name__}")
             raise RecipeError(f"{path}.{name}: {hint}")
-        _refuse_gap(value, f"{path}.{name}")
+        _check_written(value, f"{path}.{name}")
         facts = fields[name]
         kind = facts["type"]
         if kind.endswith("?") and value == NONE and NONE not in facts["choices"]:
