@@ -10,28 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import glsk_o3d as glsk
-from glsk_o3d import (
-    Connector,
-    Contraction,
-    Contractor,
-    Denoiser,
-    ExplainedScore,
-    LPRReducer,
-    OutlierRemover,
-    Pipeline,
-    RecipeError,
-    Refiner,
-    RingBuilder,
-    RingSizeRatio,
-    Sampler,
-    Thinner,
-    load_recipe,
-    pipelines,
-    samples,
-    save_recipe,
-    save_skeleton,
-    skeletonize,
-)
+from glsk_o3d import Connector, Contractor, LPRReducer, Pipeline, RecipeError, Refiner, RingBuilder, pipelines, samples
 from glsk_o3d.io.formats.fields import ARRAYS
 from glsk_o3d.pipeline import Filter, recipe_of
 from glsk_o3d.recipes import from_recipe, to_recipe
@@ -57,7 +36,7 @@ def values(facts):
         "length": st.floats(1e-100, 1e100) | st.floats(0.001, 100).map(lambda share: f"{share:.6f}%"),
         "point": st.lists(numbers, min_size=3, max_size=3).map(lambda xyz: ",".join(map(repr, xyz))),
         "bool": st.booleans(),
-        "stop": st.deferred(lambda: parts(ExplainedScore) | parts(RingSizeRatio)),
+        "stop": st.deferred(lambda: parts(glsk.ExplainedScore) | parts(glsk.RingSizeRatio)),
         "reducer": st.deferred(lambda: parts(LPRReducer)),
         "choice": st.nothing(),
     }[kind]
@@ -69,7 +48,7 @@ def parts(cls):
     return st.builds(cls, **{field.name: values(field.metadata) for field in dataclasses.fields(cls)})
 
 
-PREPARING = (Sampler, OutlierRemover, Denoiser, Thinner)
+PREPARING = (glsk.Sampler, glsk.OutlierRemover, glsk.Denoiser, glsk.Thinner)
 
 
 @given(stages=st.tuples(*map(parts, (*PREPARING, RingBuilder, Contractor, LPRReducer, Contractor, Connector, Refiner))))
@@ -84,17 +63,17 @@ def test_every_parameter_of_every_filter_survives(stages):
 def test_files(tmp_path):
     path = tmp_path / "räcipe.JSON"
     for make in pipelines.PIPELINES.values():
-        save_recipe(make(), path)
-        assert load_recipe(path) == load_recipe(str(path)) == make()
+        glsk.save_recipe(make(), path)
+        assert glsk.load_recipe(path) == glsk.load_recipe(str(path)) == make()
     assert [*tmp_path.iterdir()] == [path]
 
 
 def test_a_recipe_is_a_table_per_stage():
-    pipeline = RingBuilder(k=20) | Contractor(stop=RingSizeRatio(0.5)) | Connector(radius="3%")
+    pipeline = RingBuilder(k=20) | Contractor(stop=glsk.RingSizeRatio(0.5)) | Connector(radius="3%")
     recipe = to_recipe(pipeline)
     assert list(recipe) == ["glsk_o3d", "pipeline"]
     builder, contractor, connector = recipe["pipeline"]
-    assert builder == {"filter": "RingBuilder", **vars(RingBuilder(k=20)), "radius": "none"}
+    assert builder == {"filter": "RingBuilder", **dataclasses.asdict(RingBuilder(k=20)), "radius": "none"}
     assert contractor["reducer"] == "none"
     assert from_recipe(one("Contractor", reducer=None)) == from_recipe(one("Contractor", reducer="none"))
     assert contractor["stop"] == {"rule": "RingSizeRatio", "threshold": 0.5}
@@ -148,7 +127,7 @@ def test_wrong_recipes(tmp_path, place, words, recipe):
     path = tmp_path / "r.json"
     path.write_text(json.dumps(recipe))
     with pytest.raises(RecipeError) as in_file:
-        load_recipe(path)
+        glsk.load_recipe(path)
     assert str(in_file.value) == f"{path}: {raised.value}"
 
 
@@ -164,10 +143,10 @@ def test_wrong_recipes(tmp_path, place, words, recipe):
 def test_files_that_are_no_recipes(tmp_path, name, content, words):
     path = tmp_path / name
     with pytest.raises((FileNotFoundError, RecipeError)):
-        load_recipe(path)
+        glsk.load_recipe(path)
     path.write_bytes(content)
     with pytest.raises(RecipeError, match=f"^{re.escape(str(path))}: .*{words}"):
-        load_recipe(path)
+        glsk.load_recipe(path)
 
 
 def thin(state):
@@ -176,7 +155,7 @@ def thin(state):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Homemade(Filter):
-    consumes = produces = Contraction
+    consumes = produces = glsk.Contraction
 
     def run(self, state, context):
         return state
@@ -199,10 +178,10 @@ def never(iterations):
 def test_a_run_with_foreign_functions_has_a_recipe_that_cannot_be_read(tmp_path, stage, place, name, key):
     pipeline = RingBuilder() | stage | Connector() | Refiner()
     with pytest.raises(RecipeError, match=rf"^{re.escape(place)}.*{name}"):
-        save_recipe(pipeline, tmp_path / "r.json")
+        glsk.save_recipe(pipeline, tmp_path / "r.json")
     assert list(tmp_path.iterdir()) == []
     skeleton = pipeline(POINTS)
-    save_skeleton(skeleton, tmp_path / "s.json")
+    glsk.save_skeleton(skeleton, tmp_path / "s.json")
     recipe = glsk.read_skeleton(tmp_path / "s.json").report.recipe
     assert recipe == skeleton.report.recipe
     table = recipe["pipeline"][1]
@@ -241,27 +220,27 @@ def test_results_repeat_to_the_last_bit(tmp_path, name, ending):
     skeleton = pipeline(points)
     assert from_recipe(skeleton.report.recipe) == pipeline
     assert skeleton.report.recipe == to_recipe(pipeline)
-    save_skeleton(skeleton, tmp_path / f"s.{ending}")
+    glsk.save_skeleton(skeleton, tmp_path / f"s.{ending}")
     read = glsk.read_skeleton(tmp_path / f"s.{ending}")
     again = from_recipe(read.report.recipe)(read.points)
     for field in ARRAYS:
         np.testing.assert_array_equal(getattr(again, field), getattr(skeleton, field))
     assert again.report.recipe == read.report.recipe == skeleton.report.recipe
     if ending == "json":  # a result is a recipe too, but not an old one
-        assert load_recipe(tmp_path / "s.json") == pipeline
+        assert glsk.load_recipe(tmp_path / "s.json") == pipeline
         data = json.loads((tmp_path / "s.json").read_text())
         del data["report"]["recipe"]
         (tmp_path / "s.json").write_text(json.dumps(data))
         with pytest.raises(RecipeError, match=r"s\.json: a recipe is a table such as"):
-            load_recipe(tmp_path / "s.json")
+            glsk.load_recipe(tmp_path / "s.json")
 
 
 @pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
 def test_a_run_that_the_caller_stopped_cannot_be_repeated():
     pipeline = RingBuilder() | Contractor(max_iterations=1) | Contractor() | Connector()
-    stopped = skeletonize(POINTS, pipeline, on_iteration=lambda record: record.iteration < 3)
+    stopped = glsk.skeletonize(POINTS, pipeline, on_iteration=lambda record: record.iteration < 3)
     assert [("unwritten" in stage) for stage in stopped.report.recipe["pipeline"]] == [False, False, True, True]
     with pytest.raises(RecipeError, match=r"^pipeline\[2\]: .*solve 3"):
         from_recipe(stopped.report.recipe)
-    whole = skeletonize(POINTS, pipeline, on_iteration=lambda record: None)
+    whole = glsk.skeletonize(POINTS, pipeline, on_iteration=lambda record: None)
     assert whole.report.recipe == to_recipe(pipeline)
