@@ -12,11 +12,11 @@ from .capsules import Axis, Sample, checked_generator, directions, union_sample
 TWO_CAMERAS = ((1.1, 1.8, 1.4), (-1.2, -1.7, 1.3))
 """Where the sauropod is scanned from: front left and rear right, a little above it."""
 
-LIMB_NODES = 6  # of each limb of a tree
-CANDIDATE_LIMBS = 40  # of which the one farthest from all others grows
-LENGTH_RATIO = 0.76  # of a limb to the one that it grows from
-TAPER = np.sqrt(0.5)  # end over beginning, so that the two limbs of a fork have the cross-section of one
-LEAN, BEND, UPWARDS = 0.7, 0.3, 0.2  # how far limbs turn aside at a fork, along their length, and towards the light
+LIMB_NODES = 6  # fitted: of each limb of a tree
+CANDIDATE_LIMBS = 40  # fitted: of which the one farthest from all others grows
+LENGTH_RATIO = 0.76  # fitted: of a limb to the one that it grows from
+TAPER = np.sqrt(0.5)  # derived: end over beginning, so that the two limbs of a fork have the cross-section of one
+LEAN, BEND, UPWARDS = 0.7, 0.3, 0.2  # fitted: turns of limbs at a fork, along their length, and towards the light
 
 
 def y_junction(
