@@ -8,7 +8,6 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "docs" / "_ext")]
 os.environ.setdefault("MPLBACKEND", "Agg")
-os.environ.setdefault("DASK_LOGGING__DISTRIBUTED", "error")  # of the gallery's page on batches
 logging.getLogger("matplotlib.animation").setLevel(logging.WARNING)
 
 import glsk_o3d  # noqa: E402

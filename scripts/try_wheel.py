@@ -16,7 +16,7 @@ import venv
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-USERS = ("pictures", "crosscheck", "meshlab", "las", "e57", "graph", "cluster", "full")
+USERS = ("pictures", "crosscheck", "meshlab", "las", "e57", "graph", "full")
 BENCH = "bench"  # the wheel beside it, with glsk-bench
 TABLE = "x,y,z,tree\n" + "".join(f"{x},{y},{z},{x % 2}\n" for x in range(40) for y in (0, 1, 2) for z in (0, 1, 2))
 RING = "".join(  # clean and dense, so that a mesh closes around it

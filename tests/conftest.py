@@ -378,9 +378,7 @@ def at_once(monkeypatch):
     class Here:
         def __init__(self, count):
             counts.append(count)
-
-        def capacity(self):
-            return 2
+            self.count = 2
 
         def submit(self, function, task):
             future = Future()
@@ -390,5 +388,5 @@ def at_once(monkeypatch):
         def close(self, *, at_once):
             pass
 
-    monkeypatch.setattr("glsk_o3d.apps.batch.run.LocalWorkers", Here)
+    monkeypatch.setattr("glsk_o3d.apps.batch.run.Workers", Here)
     return counts

@@ -75,8 +75,7 @@ def run_shell(code):
     for line in code.replace("\\\n", " ").splitlines():
         words = shlex.split(re.sub(r"[][]", "", line), comments=True)  # brackets: what may be left out
         if words[:1] == ["glsk"]:
-            words = words[1:] + ["--dry-run"] * ("--scheduler" in words)  # there is no scheduler
-            result = CliRunner().invoke(app, words)
+            result = CliRunner().invoke(app, words[1:])
             assert result.exit_code == 0, f"glsk {shlex.join(words)}\n{result.output}\n{result.exception!r}"
         elif words[:1] == ["make"]:
             assert f"\n{words[1]}: " in (ROOT / "Makefile").read_text()

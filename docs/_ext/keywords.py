@@ -27,7 +27,7 @@ KEYWORDS = {
         "realsense, kinect, flying pixels, mixed pixels"
     ),
     "docs/meshlab": "meshlab, pymeshlab, mlx, filter script, filter scripts",
-    "docs/batch": "batch, parallel, dask, cluster, tiles, ledger, many clouds, many scans, large clouds, memory",
+    "docs/batch": "batch, parallel, cluster, shard, tiles, ledger, many clouds, many scans, large clouds, memory",
     "docs/formats": (
         "format, formats, file, files, save, read, load, export, las, laz, e57, ply, swc, gltf, csv, "
         "units, rig, armature, view, viewer, plot, preview, notebook, picture, html, window, "

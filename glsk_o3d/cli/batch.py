@@ -14,6 +14,7 @@ from . import options
 from .console import echo, flags, print_rows, progress, say
 from .options import SKELETON_ENDINGS, argument, option, output_option
 from .outputs import tell
+from .reporting import WrongUsage
 
 
 def batch(
@@ -28,8 +29,8 @@ def batch(
     drop_invalid: options.DropInvalid = False,
     cut_loops: options.CutLoops = False,
     workers: Annotated[int | None, option("N", "Processes; by default one for each core at hand.", min=1)] = None,
-    scheduler: Annotated[
-        str | None, option("ADDRESS|FILE", "Work on a Dask cluster: tcp://host:port, or the file of its scheduler.")
+    shard: Annotated[
+        str | None, option("I/N", "Take every N-th scan from the I-th on, such as 2/8: a job of an array.")
     ] = None,
     where: options.Where = None,
     tiles: Annotated[
@@ -54,6 +55,7 @@ def batch(
         preview=preview,
         cut_loops=cut_loops,
         recursive=recursive,
+        shard=_shard(shard),
         where=where,
         tiles=tiles,
         overlap=overlap,
@@ -76,9 +78,18 @@ def batch(
             if row["status"] == "failed" and not flags.quiet:
                 say("warning", f"{row['input']}: {row['error']}")
 
-        what |= dict(workers=workers, scheduler=scheduler, on_plan=begin, on_result=step)
+        what |= dict(workers=workers, on_plan=begin, on_result=step)
         result = batches.run_batch(inputs, output, **what)
     _tell_result(result, left_out)
+
+
+def _shard(text: str | None) -> tuple[int, int] | None:
+    if text is None:
+        return None
+    index, slash, count = text.partition("/")
+    if not (slash and index.isdecimal() and count.isdecimal()):
+        raise WrongUsage(f"--shard: {text!r}: write it as I/N, for example 2/8")
+    return int(index), int(count)
 
 
 def _tell_result(result: batches.BatchResult, left_out: dict[str, str]) -> None:

@@ -10,7 +10,7 @@ from ..errors import MissingPackageError
 
 EXTRA_OF = {
     **{"matplotlib": "pictures", "laspy": "las", "lazrs": "las", "pye57": "e57", "igl": "crosscheck"},
-    **{"pymeshlab": "meshlab", "distributed": "cluster", "networkx": "graph"},
+    **{"pymeshlab": "meshlab", "networkx": "graph"},
 }
 """The extra of this package that brings a module."""
 _NEEDED = {".html": "matplotlib", ".png": "matplotlib", ".las": "laspy", ".laz": "lazrs", ".e57": "pye57"}

@@ -64,7 +64,8 @@ BEFORE_ANY_RUN = """
     2 run points.mlx SCANS/ring.ply -o s.json              | points or a mesh and its name ends in .ply
     1 batch none -o out                                    | none: no such file or folder
     2 batch SCANS/ring.ply -o out --format stl             | unknown ending; known are .ply
-    2 batch SCANS/ring.ply -o out --workers 2 --scheduler tcp://x:1 | scheduler: the cluster has its own workers
+    2 batch SCANS/ring.ply -o out --shard 3/2              | shard = 3
+    2 batch SCANS/ring.ply -o out --shard 3                | write it as I/N
 """
 
 

@@ -45,7 +45,6 @@ requests = {
     "colours": lambda: glsk.to_line_set(skeleton, "branch"),
     "crosscheck": lambda: cross_check(points),
     "meshlab": lambda: glsk.MeshSet(),
-    "cluster": lambda: glsk.batch.run_batch("s.ply", "out", scheduler="tcp://127.0.0.1:1"),
     "las": lambda: glsk.read_cloud("scan.las"),
     "laz": lambda: glsk.read_cloud("scan.laz"),
     "e57": lambda: glsk.read_cloud("scan.e57"),
@@ -62,7 +61,7 @@ print(json.dumps(messages))
 NAMED = {
     **dict.fromkeys(("preview", "report", "plot", "colours", "batch"), "pictures"),
     **{"las": "las", "laz": "las", "e57": "e57"},
-    **{name: name for name in ("graph", "crosscheck", "meshlab", "cluster")},
+    **{name: name for name in ("graph", "crosscheck", "meshlab")},
 }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from glsk_o3d.apps.batch.workers import LocalWorkers, died
+from glsk_o3d.apps.batch.workers import Workers
 from glsk_o3d.errors import BatchError, InvalidParameterError, did_you_mean
 from glsk_o3d.geometry.cores import cores
 
@@ -130,17 +130,21 @@ def _done(todo: Mapping[str, Callable[[], Told]], jobs: int) -> Iterator[tuple[s
     if jobs == 1:
         yield from ((name, job()) for name, job in todo.items())
         return
-    workers, waiting = LocalWorkers(min(jobs, max(len(todo), 1))), list(todo.items())
+    workers, waiting = Workers(min(jobs, max(len(todo), 1))), list(todo.items())
     running: dict[Future, str] = {}
     try:
         while waiting or running:
-            while waiting and len(running) < workers.capacity():
+            while waiting and len(running) < workers.count:
                 name, job = waiting.pop(0)
                 running[workers.submit(job)] = name
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 name, error = running.pop(future), future.exception()
                 if error is not None:
-                    raise BatchError(f"{name}: the process died: out of memory?") if died(error) else error
+                    raise (
+                        BatchError(f"{name}: the process died: out of memory?")
+                        if isinstance(error, BrokenExecutor)
+                        else error
+                    )
                 yield name, future.result()
     finally:
         workers.close(at_once=False)  # what is in work takes seconds, and then leaves no temporary file

@@ -1,6 +1,6 @@
 """``glsk batch`` on many generated clouds, some of them corrupt: the ledger, the rate, and what a killed worker costs.
 
-Everything is run as its users run it: the command ``glsk`` and the commands of Dask, as processes.
+Everything is run as its users run it: the command ``glsk``, as a process.
 """
 
 from __future__ import annotations
@@ -8,19 +8,17 @@ from __future__ import annotations
 import json
 import os
 import resource
-import signal
 import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
+import psutil
 import typer
 
 from glsk_o3d import samples
@@ -73,46 +71,23 @@ def glsk_batch(scans: Path, out: Path, *words: str) -> dict:
     return {**json.loads(run.stdout), "wall": time.perf_counter() - start}
 
 
-@contextmanager
-def dask_cluster(workers: int, folder: Path) -> Iterator[tuple[str, list[subprocess.Popen]]]:
-    """A scheduler and workers of one thread each; gives the file of the scheduler, and the workers."""
-    file = folder / "scheduler.json"
-    file.unlink(missing_ok=True)
-    started = []
-
-    def dask(*words):
-        line = [sys.executable, "-m", "dask", *words, "--scheduler-file", str(file), "--no-dashboard"]
-        started.append(subprocess.Popen([*line, "--host", "127.0.0.1"], stderr=subprocess.DEVNULL))
-        return started[-1]
-
-    try:
-        dask("scheduler", "--port", "0")
-        while not file.exists():
-            time.sleep(0.1)
-        yield str(file), [dask("worker", "--no-nanny", "--nthreads", "1") for _ in range(workers)]
-    finally:
-        for process in reversed(started):
-            process.terminate()
-            process.wait()
-
-
 def ledger(out: Path) -> list[dict]:
     """The rows of a ledger."""
     path = out / "ledger.jsonl"
     return [json.loads(line) for line in path.read_bytes().splitlines()] if path.exists() else []
 
 
-def kill_one(scans: Path, out: Path, folder: Path, after: int, *words: str) -> dict:
-    """Kill one of two Dask workers once some scans or tiles are done; gives what became of all."""
-    with dask_cluster(2, folder) as (file, workers):
-        start, path = time.perf_counter(), out / "ledger.jsonl"
-        line = command(scans, out, *words, "--scheduler", file)
-        run = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        while not path.exists() or path.read_bytes().count(b'"done"') < after:
-            time.sleep(0.02)
-        workers[0].send_signal(signal.SIGKILL)
-        run.wait()
-        seconds = time.perf_counter() - start
+def kill_one(scans: Path, out: Path, after: int, *words: str) -> dict:
+    """Kill one of two workers once some scans or tiles are done; gives what became of all."""
+    start, path = time.perf_counter(), out / "ledger.jsonl"
+    line = command(scans, out, *words, "--workers", "2")
+    run = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    while not path.exists() or path.read_bytes().count(b'"done"') < after:
+        time.sleep(0.02)
+    killed = next(child for child in psutil.Process(run.pid).children() if "spawn_main" in " ".join(child.cmdline()))
+    killed.kill()
+    run.wait()
+    seconds = time.perf_counter() - start
     rows = ledger(out)
     per_worker = Counter(int(row["worker"].split()[-1]) for row in rows)
     done = [row for row in rows if row["status"] == "done"]
@@ -124,22 +99,17 @@ def kill_one(scans: Path, out: Path, folder: Path, after: int, *words: str) -> d
         "done": len(done),
         "done without output": sum(not (out / name).is_file() for row in done for name in row["outputs"]),
         "failed": sorted(row["name"] for row in rows if row["status"] == "failed"),
-        "by the killed worker": per_worker[workers[0].pid],
-        "by the other": per_worker[workers[1].pid],
+        "by the killed worker": per_worker[killed.pid],
     }
 
 
 def measured(scans: Path, folder: Path, workers: int) -> list[dict]:
-    """A row for a batch on this machine, for the same again, and for one on Dask."""
+    """A row for a batch, and for the same again."""
     rows = []
-    for where in ("this machine", "this machine, again", "Dask"):
-        row = {"where": where, "workers": workers, "load": os.getloadavg()[0]}
+    for run in ("first", "again"):
+        row = {"run": run, "workers": workers, "load": os.getloadavg()[0]}
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        if where == "Dask":
-            with dask_cluster(workers, folder) as (file, _):
-                row |= glsk_batch(scans, folder / f"dask{workers}", "--scheduler", file)
-        else:
-            row |= glsk_batch(scans, folder / f"local{workers}", "--workers", str(workers))
+        row |= glsk_batch(scans, folder / f"local{workers}", "--workers", str(workers))
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         rows.append(row | {"cpu": after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime})
     return rows
@@ -162,16 +132,16 @@ def main(
         make_scans(scans, count, smallest, largest)
         each = [int(word) for word in workers.split(",")]
         rows = [row for n in each for row in measured(scans, folder, n)]
-        killed = kill_one(scans, folder / "killed", folder, count // 4)
+        killed = kill_one(scans, folder / "killed", count // 4)
         failures = [row for row in ledger(folder / f"local{each[0]}") if row["status"] == "failed"]
     title = f"{count} clouds of {smallest} to {largest} points and 5 corrupt ones, {os.cpu_count()} cores"
-    header = ["where", "workers", "done", "skipped", "failed", "seconds", "CPU s", "clouds/s", "load before"]
+    header = ["run", "workers", "done", "skipped", "failed", "seconds", "CPU s", "clouds/s", "load before"]
     lines = []
     for row in rows:
         values = [number(row[key], 1) for key in ("wall", "cpu", "clouds_per_second", "load")]
-        lines.append([row["where"], *(str(row[key]) for key in ("workers", "done", "skipped", "failed")), *values])
+        lines.append([row["run"], *(str(row[key]) for key in ("workers", "done", "skipped", "failed")), *values])
     reasons = [[Path(row["input"]).name, row["error"]] for row in failures]
     facts = [[key, str(value)] for key, value in killed.items()]
     tables = [(title, header, lines), ("What failed", ["input", "note"], reasons)]
-    present([*tables, ("One of two Dask workers killed", ["", "note"], facts)], markdown)
-    save(output, [*rows, {"where": "one of two Dask workers killed", **killed}])
+    present([*tables, ("One of two workers killed", ["", "note"], facts)], markdown)
+    save(output, [*rows, {"run": "one of two workers killed", **killed}])

@@ -15,6 +15,7 @@ from ...interop.packages import require_for
 from ...io.paths import unknown_ending
 from ...io.scan import parsed
 from ...io.skeletons import FORMATS
+from ...parameters import check_number
 from ...pipeline import Filter, Pipeline, parts
 from ...recipes import to_recipe
 from .inputs import find_inputs
@@ -78,6 +79,7 @@ def plan_batch(
     preview: bool = False,
     cut_loops: bool = False,
     recursive: bool = False,
+    shard: tuple[int, int] | None = None,
     where: str | None = None,
     tiles: float | None = None,
     overlap: float | None = None,
@@ -102,6 +104,8 @@ def plan_batch(
         Cut loops open for formats that hold only trees.
     recursive : bool
         Take also the clouds in sub-folders.
+    shard : (int, int), optional
+        ``(i, n)`` takes every n-th cloud from the i-th on, by name: for n machines, each with an `out_dir` of its own.
     where : str, optional
         Take only points for which this holds; see `glsk_o3d.read_cloud`.
     tiles : float, optional
@@ -151,6 +155,8 @@ def plan_batch(
     ledger = Ledger(out)
     given = [inputs] if isinstance(inputs, str | os.PathLike) else inputs
     sources, left_out = find_inputs(given, out, recursive=recursive)
+    if shard is not None:
+        sources = dict(list(sources.items())[_slice_of(*shard)])
     common: dict[str, Any] = dict(out_dir=str(out), recipe=recipe, cut_loops=cut_loops, where=where)
     tasks = [
         Task(name, str(path), str(path), tuple(name + ending for ending in endings), **common)
@@ -168,6 +174,13 @@ def plan_batch(
             reasons[task.name] = "tiles to do"
     tasks = [replace(task, why=reasons[task.name]) for task in tasks]
     return Plan(out, recipe, parameters, tuple(tasks), ledger, left_out)
+
+
+def _slice_of(index: int, count: int) -> slice:
+    """Where the inputs of a shard are among all; InvalidParameterError if there is no such shard."""
+    check_number("shards", count, "int", low=1)
+    check_number("shard", index, "int", low=1, high=count)
+    return slice(index - 1, None, count)
 
 
 def _endings(formats: Sequence[str], preview: bool) -> list[str]:

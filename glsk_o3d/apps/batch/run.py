@@ -7,24 +7,20 @@ import shutil
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from ...errors import BatchError, InvalidParameterError
 from ...geometry.cores import cores
 from ...interop.atomic import remove_unfinished, write_json
 from ...parameters import check_number
 from .ledger import DONE, FAILED, LOCK_FILE, STARTED, Row, locked, refuse_ways_out
 from .plan import RECIPE_FILE, TILES_FOLDER, UP_TO_DATE, Plan, plan_batch
 from .tasks import Task, failure, in_one_line, work
-from .workers import CONNECTION_LOST, DaskWorkers, LocalWorkers, Workers, died
+from .workers import Workers
 
-if TYPE_CHECKING:
-    import distributed
-
-_POLL_SECONDS = 0.2  # seconds until Ctrl-C is noticed on Windows, and workers that have come or gone
+_POLL_SECONDS = 0.2  # seconds until Ctrl-C is noticed on Windows
 WORKER_DIED = "the worker died with it, also alone: out of memory, or a crash in native code"
 
 
@@ -65,7 +61,6 @@ def run_batch(
     out_dir: str | os.PathLike[str],
     *,
     workers: int | None = None,
-    scheduler: str | os.PathLike[str] | distributed.Client | None = None,
     on_plan: Callable[[Plan], object] | None = None,
     on_result: Callable[[Row], object] | None = None,
     **options: Any,
@@ -82,9 +77,6 @@ def run_batch(
         As in `plan_batch`; the folder is made.
     workers : int, optional
         Processes on this machine, by default one for each core that this process may use.
-    scheduler : str, path-like or distributed.Client, optional
-        A Dask cluster instead: the address of its scheduler, or its scheduler file. Its workers read and write the same
-        files, by the same paths.
     on_plan : callable, optional
         Called with the `Plan` before the work begins.
     on_result : callable, optional
@@ -97,7 +89,7 @@ def run_batch(
     Raises
     ------
     BatchError
-        Another batch writes into `out_dir`, or the workers are lost.
+        Another batch writes into `out_dir`, or worker processes die before they begin.
     KeyboardInterrupt
         After the ledger is complete.
     FileNotFoundError, InvalidParameterError, RecipeError
@@ -110,8 +102,6 @@ def run_batch(
     >>> [row["input"] for row in result.rows.values() if row["status"] == "failed"]  # doctest: +SKIP
     []
     """
-    if scheduler is not None and workers is not None:
-        raise InvalidParameterError("scheduler: the cluster has its own workers: give no number of them")
     check_number("workers", workers, "int?", low=1)
     folder = Path(os.path.abspath(out_dir))
     new = [path for path in (folder, *folder.parents) if not path.exists()]
@@ -126,11 +116,7 @@ def run_batch(
             raise
         if on_plan is not None:
             on_plan(plan)
-        crew: Workers
-        if scheduler is not None and plan.todo:
-            crew = DaskWorkers(scheduler)
-        else:
-            crew = LocalWorkers(min(workers or cores(), len(plan.todo)))
+        crew = Workers(min(workers or cores(), len(plan.todo)))
         start, complete = time.perf_counter(), False
         try:
             try:
@@ -140,8 +126,7 @@ def run_batch(
             complete = True
         finally:
             crew.close(at_once=not complete)
-            if isinstance(crew, LocalWorkers):  # others may be at work on another machine
-                remove_unfinished(plan.out_dir)
+            remove_unfinished(plan.out_dir)
     rows = {task.name: plan.ledger.rows[task.name] for task in plan.tasks}
     failed = sum(row["status"] == FAILED for row in rows.values())
     seconds = time.perf_counter() - start
@@ -175,25 +160,19 @@ class _Run:
                 self._enter(lost, failure(WORKER_DIED))
 
     def _lost_of(self, tasks: list[Task]) -> list[Task]:
-        """Have tasks done, side by side; gives those whose workers died. BatchError where there are none any more."""
+        """Have tasks done, side by side; gives those whose workers died."""
         ready, running, lost = deque(tasks), dict[Future[Any], Task](), []
         while running or ready:
-            while len(running) < self._workers.capacity() and ready:
+            while len(running) < self._workers.count and ready:
                 task = ready.popleft()
                 self._begin(task)
                 running[self._workers.submit(work, task)] = task
-            problem = None
             for future in wait(running, _POLL_SECONDS, FIRST_COMPLETED).done:
-                task = running.pop(future)
-                error = BatchError(CONNECTION_LOST) if future.cancelled() else future.exception()
-                if isinstance(error, BatchError):
-                    problem = error
-                elif died(error):
+                task, error = running.pop(future), future.exception()
+                if isinstance(error, BrokenExecutor):
                     lost.append(task)
                 else:
                     self._enter(task, future.result() if error is None else failure(in_one_line(error)))
-            if problem is not None:
-                raise problem
         return lost
 
     def _begin(self, task: Task) -> None:

@@ -15,7 +15,7 @@ from ...interop.clouds import open3d_class, surface_mesh
 from ...parameters import check_number
 from ...pipeline import Pipeline
 from ...recipes import from_recipe, to_recipe
-from .workers import LocalWorkers
+from .workers import Workers
 
 CLOSED = "the Skeletonizer was closed before its stream was at an end"
 
@@ -54,7 +54,7 @@ class Skeletonizer:
     def __init__(self, pipeline: PipelineChoice = "default", *, workers: int = 1, **options: Any) -> None:
         check_number("workers", workers, "int", low=1)
         self.pipeline: Pipeline[Any, Skeleton] = chosen_pipeline(pipeline, options)
-        self._count, self._pool = workers, LocalWorkers(workers)
+        self._count, self._pool = workers, Workers(workers)
         self._recipe = to_recipe(self.pipeline) if workers > 1 else {}
 
     def __enter__(self) -> Skeletonizer:
@@ -65,7 +65,7 @@ class Skeletonizer:
 
     def close(self) -> None:
         """End the processes when they have done what they do; a later stream starts others."""
-        pool, self._pool = self._pool, LocalWorkers(self._count)
+        pool, self._pool = self._pool, Workers(self._count)
         pool.close(at_once=False)  # a process that is killed while it sends leaves the other end waiting for ever
 
     def stream(self, clouds: Iterable[Any]) -> Iterator[Skeleton]:

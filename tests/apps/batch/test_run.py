@@ -66,6 +66,12 @@ def test_a_second_run_does_what_has_changed(run, scans, rows, write, tmp_path):
     assert {row["status"] for row in rows().values()} == {"done"}
 
 
+def test_shards_are_disjoint_and_together_all(run, scans, rows):
+    for index, names in enumerate(("ac", "b"), 1):
+        assert run(out=str(index), shard=(index, 2), formats=["npz"]) == dict.fromkeys(names, "new")
+        assert list(rows(str(index))) == list(names)
+
+
 def test_other_parameters_are_another_result(run, scans, rows):
     scan = [scans / "a.ply"]
     run()
@@ -183,7 +189,7 @@ def test_a_large_cloud_is_read_in_blocks(run, rows, tmp_path, monkeypatch, where
         ({"formats": ["stl"]}, "unknown ending"),
         ({"formats": []}, "nothing to write"),
         ({"workers": 0}, "workers = 0"),
-        ({"workers": 2, "scheduler": "tcp://x:1"}, "cluster has its own workers"),
+        ({"shard": (3, 2)}, "shard = 3"),
     ],
 )
 def test_wrong_arguments(scans, tmp_path, options, message):

@@ -3,7 +3,7 @@
 import json
 
 import numpy as np
-import psutil  # comes with distributed
+import psutil
 import pytest
 
 from glsk_o3d import InvalidParameterError, read_skeleton, samples

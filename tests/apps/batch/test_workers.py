@@ -5,18 +5,18 @@ import signal
 import subprocess
 import sys
 
-import psutil  # comes with distributed
+import psutil
 import pytest
 
 from glsk_o3d.apps.batch import run_batch
 from glsk_o3d.apps.batch.run import WORKER_DIED
-from glsk_o3d.apps.batch.workers import LocalWorkers
+from glsk_o3d.apps.batch.workers import Workers
 
 
 def test_workers_compute_in_one_thread_and_ignore_ctrl_c(monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
     monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
-    workers = LocalWorkers(1)
+    workers = Workers(1)
     try:
         assert workers.submit(os.getenv, "OMP_NUM_THREADS").result() == "1"
         assert workers.submit(os.getenv, "OPENBLAS_NUM_THREADS").result() == "1"
