@@ -139,12 +139,8 @@ def _done(todo: Mapping[str, Callable[[], Told]], jobs: int) -> Iterator[tuple[s
                 running[workers.submit(job)] = name
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 name, error = running.pop(future), future.exception()
-                if error is not None:
-                    raise (
-                        BatchError(f"{name}: the process died: out of memory?")
-                        if isinstance(error, BrokenExecutor)
-                        else error
-                    )
+                if isinstance(error, BrokenExecutor):
+                    raise BatchError(f"{name}: the process died: out of memory?")
                 yield name, future.result()
     finally:
         workers.close(at_once=False)  # what is in work takes seconds, and then leaves no temporary file
