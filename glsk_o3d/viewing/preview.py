@@ -6,28 +6,28 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.summary import point_count, structure
 from ..data.report import Report
 from ..data.skeleton import Skeleton
 from ..errors import InvalidParameterError
-from ..geometry.vectors import norm
+from ..geometry.vectors import box
 from ..interop.atomic import check_ending
+from ..interop.packages import require
 from . import figures
 from .figures import INK, PAPER
 
 _RED, _BLUE, _AMBER = "#d0121f", "#1f5fbf", "#a05000"
-_LINE_HEIGHT, _LETTER_WIDTH, _MOST_LINES, _MOST_WARNINGS = 0.16, 0.066, 2, 2  # inches; lines of each warning, warnings
-_TITLE_SIZE = 1.5  # over the size of the other letters
 _FAR_DOT, _NEAR_DOT, _AMBER_DOT = np.array([0.89] * 3), np.array([0.64] * 3), np.array([0.93, 0.6, 0.15])
 ROOT_MARK = {"marker": "D", "s": 22, "facecolors": _BLUE, "edgecolors": "white", "linewidths": 0.6, "label": "root"}
 """How the place is drawn that a tree grows from."""
 
-# Fitted to the eye: the cloud's dots as a share of the area of a view, and each in square points at least and at most;
-# the width of lines and of the dots on them over the median branch, and at least and at most in points.
-_DOTS_SHARE, _DOT_AREA = 0.12, (0.6, 5)
-_LINE_SHARE, _LINE_WIDTH = 0.065, (0.6, 1.5)
-_DOT_SHARE, _WIDEST_DOT, _LONE_DOT = 0.12, 3.0, 3.7
-_MOST_MARKS = 12  # of what samples disagree with
+# All fitted to the eye.
+_VIEWS = ((0, 2), (1, 2), (0, 1))  # coordinates across and up: from the front, from the side, and from above
+_SMALLEST_VIEWS, _LARGEST_VIEWS = (5.0, 2.0), (11.0, 6.5)  # inches, of all views together
+_THINNEST = 0.08  # of an extent, over the largest: flat things have room for the width of their lines
+_DOT_INK, _DOT_AREA = 40_000.0, (0.6, 5.0)  # square points of all dots of a cloud together, and of one
+_MOST_DOTTED = 100  # branches, beyond which ends and junctions have no dots
+_MOST_LINES, _MOST_WARNINGS, _MOST_MARKS = 2, 2, 12  # lines of a warning; warnings; marks of what samples disagree with
+_LETTERS = 14  # of the smaller size, per inch
 
 
 def save_preview(
@@ -40,12 +40,12 @@ def save_preview(
 ) -> None:
     """Draw a skeleton and its cloud from three sides into a PNG file.
 
-    The three views look along the coordinate axes, all at the scale of the bar above them: x across and z up, y across
-    and z up, x across and y up. They are arranged so that they are large, in 900 x 450 to 1800 x 1200 pixels. The cloud
-    is grey, lighter where it is farther; edges are red, junctions dark dots and leaves open ones, unless branches are
-    too short for dots; a blue diamond is where a tree grows from, ``Report.root``. After `support`, amber rings mark
-    parts that few samples show, and crosses those that the skeleton lacks but samples show, with their numbers. Below
-    are the counts, the first two warnings, and the number of the others.
+    The three views are those of an engineering drawing: from the front (x across, z up), beside it from the side (y
+    across, z up), and below it from above (x across, y up), all at the scale of the bar. The cloud is grey, lighter
+    where it is farther; edges are red, junctions dark dots and leaves open ones, unless there are more than a hundred
+    branches; a blue diamond is where a tree grows from, ``Report.root``. After `support`, amber rings mark parts that
+    few samples show, and crosses those that the skeleton lacks but samples show, with their numbers. Below are the
+    counts, the first two warnings, and the number of the others.
 
     Parameters
     ----------
@@ -86,87 +86,104 @@ def draw(
         raise InvalidParameterError(f"marked: {len(points)} points need as many values, not {np.shape(marked)}")
     shown = figures.thinned(points, figures.MOST_DRAWN_POINTS)
     cloud, amber = points[shown], np.zeros(len(shown), bool) if marked is None else np.asarray(marked, bool)[shown]
-    vertices = [curve.vertices for curve in (skeleton, beside) if curve is not None]
-    centre, extent = figures.room(np.concatenate([cloud, *vertices]))
-    head, foot, report = 0.58 if title else 0.25, 0.34, skeleton.report
-    room = _LINE_HEIGHT * (_MOST_LINES * _MOST_WARNINGS + 1) if report.warnings else 0
-    figure = figures.new_figure(figures.fitting_size(extent, head=head, foot=foot + room))
-    width, height = figure.get_size_inches()
-    pairs = (f"{name}_{value}" for name, value in counts(skeleton).items())
-    counted = [line.replace("_", " ") for line in _wrapped("   ".join(pairs), width)]
-    warned = [line for text in report.warnings[:_MOST_WARNINGS] for line in _wrapped(f"warning: {text}", width)]
-    if (more := len(report.warnings) - _MOST_WARNINGS) > 0:
-        warned.append(f"and {more} more warning{'s' * (more > 1)}")
-    heads = _wrapped(figures.printable(title or ""), width / _TITLE_SIZE)
-    below, head = _LINE_HEIGHT * len(warned), head + _TITLE_SIZE * _LINE_HEIGHT * max(len(heads) - 1, 0)
-    foot += _LINE_HEIGHT * (len(counted) - 1)
-    for a, b, axes in figures.three_views(figure, extent, head=head, foot=foot + below):
-        scale = 72 * axes.get_position().width * width / extent[a]  # points per unit
-        _draw_cloud(axes, cloud - centre, amber, a, b, scale**2 * np.prod(np.sort(extent)[1:]))
-        if beside is not None:
-            _draw_curve(axes, beside, beside.vertices - centre, [a, b], scale, _BLUE)
-        _draw_curve(axes, skeleton, skeleton.vertices - centre, [a, b], scale, _RED)
-        _mark_doubts(axes, report, centre, [a, b])
-        if report.root:
-            axes.scatter(*np.subtract(report.root, centre)[[a, b]], **ROOT_MARK, zorder=4, clip_on=False)
-    style = dict(ha="center", parse_math=False)
-    lines = [*((line, INK, 0.12) for line in counted), *((line, _AMBER, 0.1) for line in warned)]
-    for row, (line, color, up) in enumerate(reversed(lines)):
-        place = (up + row * _LINE_HEIGHT) / height
-        figure.text(0.5, place, figures.printable(line), color=color, fontsize=8, **style)
-    for row, line in enumerate(heads):
-        place = 1 - (0.33 + row * _TITLE_SIZE * _LINE_HEIGHT) / height
-        figure.text(0.5, place, line, color=INK, fontsize=8 * _TITLE_SIZE, **style)
+    curves = [(curve, color) for curve, color in ((beside, _BLUE), (skeleton, _RED)) if curve is not None]
+    drawn = np.concatenate([cloud, *(curve.vertices for curve, _ in curves)])
+    low, high = box(drawn) if len(drawn) else np.zeros((2, 3))
+    # the middle is taken off, and the unit is the largest side: transforms of matplotlib lose digits
+    centre, unit = low + (high - low) / 2, (high - low).max() or 1.0
+    extent = np.maximum((high - low) / unit, _THINNEST)
+    figure, views = _three_views(extent, unit)
+    for a, b, axes in views:
+        _draw_cloud(axes, (cloud - centre) / unit, amber, a, b)
+        for curve, color in curves:
+            _draw_curve(axes, curve, ((curve.vertices - centre) / unit)[:, [a, b]], color)
+        _mark_doubts(axes, skeleton.report, centre, unit, [a, b])
+        if skeleton.report.root:
+            place = (np.subtract(skeleton.report.root, centre) / unit)[[a, b]]
+            axes.scatter(*place, **ROOT_MARK, zorder=4, clip_on=False)
+    letters = int(_LETTERS * figure.get_figwidth())
+    heads = _wrapped(title or "", int(letters / 1.5))
+    color = _AMBER if skeleton.report.warnings else INK
+    figure.suptitle("\n".join(heads), color=INK, fontsize=12, parse_math=False)
+    figure.supxlabel("\n".join(_caption(skeleton, letters)), color=color, fontsize=8, parse_math=False)
     return figure
 
 
-def counts(skeleton: Skeleton) -> dict[str, str]:
-    """The counts of a skeleton and its length, as people read them."""
-    facts = {"points": point_count(skeleton), **structure(skeleton)}
-    return {name: f"{value:.4g}" if name == "length" else f"{value:,}" for name, value in facts.items()}
+def _three_views(extent: np.ndarray, unit: float) -> tuple[Any, list[tuple[int, int, Any]]]:
+    """A figure, and the axes of the views, at one scale, with the coordinates that go across and up.
+
+    The objects are around the origin; their sides are `extent` in a `unit` of the user's, in which the bar has a length
+    that is a round number.
+    """
+    require("matplotlib")
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.ticker import MaxNLocator
+    from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
+
+    sides = extent[0] + extent[1], extent[2] + extent[1]
+    size = np.clip(min(np.divide(_LARGEST_VIEWS, sides)) * np.array(sides), _SMALLEST_VIEWS, _LARGEST_VIEWS)
+    figure = figures.new_figure(size + [1.0, 1.5], layout="compressed")
+    grid = figure.subplots(2, 2, width_ratios=extent[:2], height_ratios=extent[[2, 1]])
+    grid[1, 1].set_axis_off()
+    views = [(a, b, axes) for (a, b), axes in zip(_VIEWS, grid.flat, strict=False)]
+    for a, b, axes in views:
+        axes.set(xticks=[], yticks=[], xlim=(-extent[a] / 2, extent[a] / 2), ylim=(-extent[b] / 2, extent[b] / 2))
+        axes.set_aspect("equal")
+        axes.spines[:].set_visible(False)
+        axes.set_xlabel("xyz"[a], color="#999999", fontsize=7)
+        axes.set_ylabel("xyz"[b], color="#999999", fontsize=7)
+    length = MaxNLocator(2, steps=[1, 2, 5, 10]).tick_values(0, extent[0] * unit / 2)[1]
+    place = dict(loc="lower left", bbox_to_anchor=(0, 1), bbox_transform=grid[0, 0].transAxes)  # above the view
+    style = dict(frameon=False, borderpad=0.5, color=INK, fontproperties=FontProperties(size=7))
+    grid[0, 0].add_artist(AnchoredSizeBar(grid[0, 0].transData, length / unit, f"{length:g}", **place, **style))
+    return figure, views
 
 
-def _draw_cloud(axes: Any, cloud: np.ndarray, amber: np.ndarray, a: int, b: int, area: float) -> None:
-    """Grey dots, lighter where they are farther, some of them amber; smaller the more are in the area [points^2]."""
+def _caption(skeleton: Skeleton, letters: int) -> list[str]:
+    """The counts and the first warnings, in lines of at most so many letters."""
+    warnings = skeleton.report.warnings
+    pairs = "   ".join(f"{name} {value}" for name, value in figures.counts(skeleton).items())
+    lines = [*textwrap.wrap(pairs, letters)]
+    for text in warnings[:_MOST_WARNINGS]:
+        lines += _wrapped(f"warning: {text}", letters)
+    hidden = len(warnings) - _MOST_WARNINGS
+    return lines + [f"and {hidden} more warning{'s' * (hidden > 1)}"] * (hidden > 0)
+
+
+def _wrapped(text: str, letters: int) -> list[str]:
+    """A text in at most two lines."""
+    return textwrap.wrap(figures.printable(text), letters, max_lines=_MOST_LINES, placeholder=" ...")
+
+
+def _draw_cloud(axes: Any, cloud: np.ndarray, amber: np.ndarray, a: int, b: int) -> None:
+    """Grey dots, lighter where they are farther, some of them amber; smaller the more there are."""
     depth, toward = cloud[:, 3 - a - b], 1 if (a, b) != (0, 2) else -1  # x, y, z are right-handed
     order = np.argsort(toward * depth, kind="stable")
-    near = (np.arange(len(order)) / max(len(order) - 1, 1))[:, None]
-    style = {"linewidths": 0, "clip_on": False, "s": np.clip(_DOTS_SHARE * area / max(len(cloud), 1), *_DOT_AREA)}
+    near = np.linspace(0, 1, len(order))[:, None]
     color = np.where(amber[order, None], _AMBER_DOT, _FAR_DOT + near * (_NEAR_DOT - _FAR_DOT))
-    axes.scatter(cloud[order, a], cloud[order, b], c=color, **style)
+    area = np.clip(_DOT_INK / max(len(cloud), 1), *_DOT_AREA)
+    axes.scatter(cloud[order, a], cloud[order, b], c=color, s=area, linewidths=0, clip_on=False)
 
 
-def _draw_curve(
-    axes: Any, skeleton: Skeleton, vertices: np.ndarray, across_up: list[int], scale: float, color: str
-) -> None:
-    """Edges, and junctions and leaves where branches are long enough for dots on them; the scale is points per unit."""
+def _draw_curve(axes: Any, skeleton: Skeleton, vertices: np.ndarray, color: str) -> None:
+    """Edges between vertices, (n, 2) float array, with dots at junctions, leaves and detached vertices."""
     from matplotlib.collections import LineCollection
 
-    lengths = [norm(np.diff(skeleton.vertices[path], axis=0)).sum() for path in skeleton.branches]
-    branch = scale * float(np.median(lengths)) if lengths else 0.0
-    line = float(np.clip(_LINE_SHARE * branch, *_LINE_WIDTH))
-    segments = vertices[skeleton.edges][:, :, across_up]
-    axes.add_collection(LineCollection(segments, colors=color, linewidths=line, capstyle="round", clip_on=False))
-    dot = min(_DOT_SHARE * branch, _WIDEST_DOT)
-    spots = [(skeleton.degree == 0, color, _LONE_DOT)]
-    if dot > line:
-        spots += [(skeleton.degree == 1, PAPER, dot), (skeleton.degree > 2, INK, dot)]
-    for chosen, face, wide in spots:
-        style = {"s": wide**2, "facecolors": face, "edgecolors": color if face == PAPER else face}
-        axes.scatter(*vertices[chosen][:, across_up].T, zorder=3, clip_on=False, linewidths=0.3 * wide, **style)
+    style = dict(capstyle="round", clip_on=False)
+    axes.add_collection(LineCollection(vertices[skeleton.edges], colors=color, linewidths=1.3, **style))
+    dots = [(skeleton.degree == 0, color, color)]
+    if len(skeleton.branches) <= _MOST_DOTTED:
+        dots += [(skeleton.degree == 1, PAPER, color), (skeleton.degree > 2, INK, INK)]
+    for chosen, face, edge in dots:
+        style = dict(s=8, linewidths=0.8, facecolors=face, edgecolors=edge, zorder=3, clip_on=False)
+        axes.scatter(*vertices[chosen].T, **style)
 
 
-def _mark_doubts(axes: Any, report: Report, centre: np.ndarray, across_up: list[int]) -> None:
-    """Amber rings around what few samples show, crosses where many show what is not there, and how many of them."""
-    for it in report.unsupported[:_MOST_MARKS]:
-        x, y = np.subtract(it.place, centre)[across_up]
+def _mark_doubts(axes: Any, report: Report, centre: np.ndarray, unit: float, across_up: list[int]) -> None:
+    """Amber rings around what few samples show, crosses where many show what the skeleton lacks, with their share."""
+    for part in report.unsupported[:_MOST_MARKS]:
+        x, y = (np.subtract(part.place, centre) / unit)[across_up]
         ring, cross = dict(marker="o", facecolors="none", edgecolors=_AMBER), dict(marker="x", c=_AMBER)
-        axes.scatter(x, y, s=70, linewidths=1, zorder=5, clip_on=False, **(ring if it.present else cross))
-        note = f"{round(it.share * report.n_draws)}/{report.n_draws}"
+        axes.scatter(x, y, s=70, linewidths=1, zorder=5, clip_on=False, **(ring if part.present else cross))
+        note = f"{round(part.share * report.n_draws)}/{report.n_draws}"
         axes.annotate(note, (x, y), (6, 4), textcoords="offset points", color=_AMBER, fontsize=6, annotation_clip=False)
-
-
-def _wrapped(text: str, width: float) -> list[str]:
-    """A text in at most two lines of small letters as wide as a picture."""
-    letters = int((width - 2 * figures.VIEW_GAP) / _LETTER_WIDTH)
-    return textwrap.wrap(text, letters, max_lines=_MOST_LINES, placeholder=" ...", break_on_hyphens=False)
