@@ -81,7 +81,6 @@ NAMES = {
     "batch": {
         "Running": ("run_batch", "BatchResult"),
         "Plans": ("plan_batch", "Plan"),
-        "Streams": ("Skeletonizer",),
     },
     "crosscheck": {"The check": ("cross_check", "CrossCheck")},
     "samples": {

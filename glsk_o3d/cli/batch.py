@@ -13,7 +13,7 @@ from ..apps import batch as batches
 from . import options
 from .console import echo, flags, print_rows, progress, say
 from .options import SKELETON_ENDINGS, argument, option, output_option
-from .outputs import tell
+from .outputs import print_result
 from .reporting import WrongUsage
 
 
@@ -62,7 +62,7 @@ def batch(
         force=force,
     )
     if dry_run:
-        _tell_plan(batches.plan_batch(inputs, output, **what))
+        _print_plan(batches.plan_batch(inputs, output, **what))
         return
     left_out, total, done = dict[str, str](), 0, count(1)
     with progress(remaining=True) as update:
@@ -71,7 +71,7 @@ def batch(
         def begin(plan: batches.Plan) -> None:
             nonlocal left_out, total
             left_out, total = plan.left_out, len(plan.todo)
-            _say_left_out(plan)
+            _print_left_out(plan)
 
         def step(row: dict[str, Any]) -> None:
             update(f"done: {row['input']}", next(done), total)
@@ -80,7 +80,7 @@ def batch(
 
         what |= dict(workers=workers, on_plan=begin, on_result=step)
         result = batches.run_batch(inputs, output, **what)
-    _tell_result(result, left_out)
+    _print_result(result, left_out)
 
 
 def _shard(text: str | None) -> tuple[int, int] | None:
@@ -92,7 +92,7 @@ def _shard(text: str | None) -> tuple[int, int] | None:
     return int(index), int(count)
 
 
-def _tell_result(result: batches.BatchResult, left_out: dict[str, str]) -> None:
+def _print_result(result: batches.BatchResult, left_out: dict[str, str]) -> None:
     """Print what a batch did; BatchError if something failed."""
     from ..errors import BatchError
 
@@ -101,24 +101,24 @@ def _tell_result(result: batches.BatchResult, left_out: dict[str, str]) -> None:
     facts: dict[str, Any] = {name: getattr(result, name) for name in ("done", "skipped", "failed")}
     facts |= {"seconds": round(result.seconds, 3), "clouds_per_second": round(result.rate, 3)}
     facts |= {"with_warnings": sum(bool(row.get("warnings")) for row in rows), "ledger": str(result.ledger)}
-    tell({**facts, "failures": failures, "left_out": left_out}, lambda: print_rows(facts))
+    print_result({**facts, "failures": failures, "left_out": left_out}, lambda: print_rows(facts))
     if failures:
         raise BatchError(f"{len(failures)} of {len(rows)} scans failed: {result.ledger} says why")
 
 
-def _tell_plan(plan: batches.Plan) -> None:
+def _print_plan(plan: batches.Plan) -> None:
     def words() -> None:
         for task in plan.todo:
             echo(f"{task.source} ({task.why}) -> {', '.join(task.outputs)}")
         echo(f"{len(plan.todo)} to do, {plan.skipped} to skip")
-        _say_left_out(plan)
+        _print_left_out(plan)
 
     tasks = [{"input": task.source, "why": task.why, "outputs": task.outputs} for task in plan.tasks]
     facts = {"todo": len(plan.todo), "skipped": plan.skipped, "output": str(plan.out_dir)}
-    tell({**facts, "tasks": tasks, "left_out": plan.left_out}, words)
+    print_result({**facts, "tasks": tasks, "left_out": plan.left_out}, words)
 
 
-def _say_left_out(plan: batches.Plan) -> None:
+def _print_left_out(plan: batches.Plan) -> None:
     """Say how many files are not taken, and why; their names are in JSON."""
     for reason, n in Counter(plan.left_out.values()).items():
         if not flags.quiet:

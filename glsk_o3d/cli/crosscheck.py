@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from ..errors import did_you_mean
 from .console import print_rows, progress, value_in_words
 from .options import DropInvalid, PipelineName, Preview, ReportPage, ScanFile, option
-from .outputs import PAGE, PICTURE, Output, check_outputs, tell, write_each
+from .outputs import PAGE, PICTURE, Output, check_outputs, print_result, write_outputs
 from .reporting import WrongUsage
 
 MOST_PARTS = 3  # of the mesh that are told of
@@ -39,7 +39,7 @@ def crosscheck(
     'cannot tell', where the mesh is at fault.
     """
     from ..apps.crosscheck import cross_check
-    from ..apps.crosscheck.check import MADE_BY
+    from ..apps.crosscheck.check import MESH_KINDS
     from ..interop.clouds import SurfaceMesh
     from ..io.scans import read_mesh, read_scan
     from ..viewing.figures import printable
@@ -50,9 +50,9 @@ def crosscheck(
         Output(preview, *PICTURE, _save_picture),
         Output(report, *PAGE, _save_page),
     ]
-    own = None if mesh in MADE_BY else Path(mesh)
+    own = None if mesh in MESH_KINDS else Path(mesh)
     if own and not own.suffix:
-        raise WrongUsage(f"--mesh: {did_you_mean(mesh, MADE_BY, 'mesh')}")
+        raise WrongUsage(f"--mesh: {did_you_mean(mesh, MESH_KINDS, 'mesh')}")
     check_outputs(outputs, scan, own)
     chosen = choose(pipeline, drop_invalid=drop_invalid)
     with progress() as update:
@@ -62,9 +62,9 @@ def crosscheck(
         surface = read_mesh(own) if own else mesh
         update("comparing with a mesh")
         check = cross_check(cloud, pipeline=chosen, mesh=surface)
-        files = write_each(outputs, check, update)
+        files = write_outputs(outputs, check, update)
     facts = {"scan": printable(scan), **check.to_dict()}
-    tell(facts, lambda: print_rows(_rows(check), title=f"{scan}: {check.verdict}"), files)
+    print_result(facts, lambda: print_rows(_rows(check), title=f"{scan}: {check.verdict}"), files)
 
 
 def _rows(check: Any) -> dict[str, Any]:

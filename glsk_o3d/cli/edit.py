@@ -17,7 +17,7 @@ from .options import (
     output_option,
     root_option,
 )
-from .outputs import Output, check_outputs, skeleton_outputs, tell, write_each
+from .outputs import Output, check_outputs, print_result, skeleton_outputs, write_outputs
 
 
 def edit(
@@ -51,7 +51,7 @@ def edit(
     check_outputs(outputs, skeleton, needed="an output with -o, a --preview or a --report")
     before = edited = read_skeleton(skeleton)
     if limb is not None:
-        judged = any(it.about == "limb" for it in before.report.decisions)
+        judged = any(decision.about == "limb" for decision in before.report.decisions)
         if not judged and not any(stage.startswith("Refiner") for stage in before.report.stages):
             needed = "--limb needs the .json or .npz of a run whose Refiner has a limb above 0"
             raise FileFormatError(f"{skeleton}: holds no decisions about limbs: {needed}")
@@ -66,9 +66,9 @@ def edit(
         edited = editing.prune(edited, length=prune_length, order=prune_order)
     if tolerance is not None:
         edited = editing.simplify(edited, tolerance=tolerance)
-    files, old, new = write_each(outputs, edited), structure(before), structure(edited)
+    files, old, new = write_outputs(outputs, edited), structure(before), structure(edited)
     changed = [f"{name} {old[name]:.6g} -> {new[name]:.6g}" for name in old if old[name] != new[name]]
-    tell({"before": old, "after": new}, lambda: echo(", ".join(changed) or "all counts are as before"), files)
+    print_result({"before": old, "after": new}, lambda: echo(", ".join(changed) or "all counts are as before"), files)
 
 
 def convert(
@@ -82,7 +82,7 @@ def convert(
 
     outputs = skeleton_outputs([*(files or []), *(output or [])], cut_loops=cut_loops)
     check_outputs(outputs, skeleton, needed="a FILE, or -o FILE")
-    tell({}, lambda: None, write_each(outputs, read_skeleton(skeleton)))
+    print_result({}, lambda: None, write_outputs(outputs, read_skeleton(skeleton)))
 
 
 def rig(
@@ -111,4 +111,4 @@ def rig(
         except FileFormatError:
             surface = read_cloud(mesh)  # knows best what else may be wrong with the file
     bones = save_rig(curve, output, surface, cut_loops=cut_loops, root=root, up=up)
-    tell({}, lambda: echo(f"{len(bones.edges)} bones"), {output: ""})
+    print_result({}, lambda: echo(f"{len(bones.edges)} bones"), {output: ""})

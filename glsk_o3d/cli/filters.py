@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from ..parameters import Parameters, allowed_values
 from .console import echo, print_table
 from .options import argument
-from .outputs import tell
+from .outputs import print_result
 from .reporting import WrongUsage
 
 
@@ -39,7 +39,7 @@ def filters(
         for item in chain(*facts.values()):
             _print(item, full=name is not None)
 
-    tell(facts, words)
+    print_result(facts, words)
 
 
 def _filter_facts(cls: type[Parameters]) -> dict[str, Any]:

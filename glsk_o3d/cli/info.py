@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from .console import print_rows, print_table
 from .options import Where, argument, option
-from .outputs import check_outputs, skeleton_outputs, tell, write_each
+from .outputs import check_outputs, print_result, skeleton_outputs, write_outputs
 
 if TYPE_CHECKING:
     from ..data.skeleton import Skeleton
@@ -38,7 +38,7 @@ def info(file: Annotated[Path, argument("FILE", "A cloud, mesh or skeleton.")], 
             print_table(iteration_rows(records), list(ITERATION_COLUMNS))
 
     steps = {"iterations": list(map(asdict, records))} if records else {}
-    tell({"file": str(file), **facts, **steps}, words)
+    print_result({"file": str(file), **facts, **steps}, words)
 
 
 def _cloud_facts(file: Path, where: str | None) -> dict[str, Any]:
@@ -160,4 +160,4 @@ def view(
     if preview is None and report is None:
         show(skeleton, cloud, title=file.name)
     else:
-        tell({}, lambda: None, write_each(outputs, skeleton))
+        print_result({}, lambda: None, write_outputs(outputs, skeleton))

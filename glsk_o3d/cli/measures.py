@@ -11,7 +11,7 @@ from .. import analysis
 from ..errors import FileFormatError, InvalidParameterError, SkeletonWarning
 from .console import echo, print_rows, print_table, progress, value_in_words
 from .options import Root, SkeletonFile, argument, option, output_option
-from .outputs import Output, check_outputs, tell, write_each
+from .outputs import Output, check_outputs, print_result, write_outputs
 from .reporting import WrongUsage
 
 
@@ -66,7 +66,7 @@ def evaluate(
             if numbers is not None:
                 print_rows(numbers, title=name)
 
-    tell(facts, words)
+    print_result(facts, words)
 
 
 def branches(
@@ -96,7 +96,7 @@ def branches(
         columns = table.printed()
         print_table(zip(*columns.values(), strict=True), [name.replace("_", " ") for name in columns])
 
-    tell({"skeleton": str(skeleton), "branches": list(table)}, words, write_each(outputs, table))
+    print_result({"skeleton": str(skeleton), "branches": list(table)}, words, write_outputs(outputs, table))
 
 
 def tree(
@@ -121,9 +121,9 @@ def tree(
     check_outputs(outputs, skeleton)
     curve = read_skeleton(skeleton)
     measures = analysis.tree_measures(curve, root, up=up, unit=unit)
-    files = write_each(outputs, analysis.cylinders(curve, root, up)) if output else {}
+    files = write_outputs(outputs, analysis.cylinders(curve, root, up)) if output else {}
     facts = {"skeleton": str(skeleton), **asdict(measures)}
-    tell(facts, lambda: print_rows({**facts, "doubts": None}), files)
+    print_result(facts, lambda: print_rows({**facts, "doubts": None}), files)
 
 
 def grasps(
@@ -157,7 +157,7 @@ def grasps(
     )
     best, n = candidates[:count], len(candidates)
     facts = {"skeleton": str(skeleton), "found": n, **best.as_dict()}
-    tell(facts, lambda: _print_grasps(best, n), write_each(outputs, best))
+    print_result(facts, lambda: _print_grasps(best, n), write_outputs(outputs, best))
 
 
 def _print_grasps(best: Any, n: int) -> None:

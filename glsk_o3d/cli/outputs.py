@@ -76,7 +76,7 @@ def check_outputs(outputs: Iterable[Output], *inputs: Path | None, needed: str |
             raise OSError(f"{path}: no file can be made in this folder: {error.strerror}") from error
 
 
-def write_each(
+def write_outputs(
     outputs: Iterable[Output], result: Any, update: Callable[[str], object] = lambda text: None
 ) -> dict[Path, str]:
     """Write all files that can be written; one that cannot does not keep the others from it.
@@ -100,10 +100,10 @@ def write_each(
     return problems
 
 
-def tell(facts: Any, words: Callable[[], object], files: Mapping[Path, str] | None = None) -> None:
+def print_result(facts: Any, words: Callable[[], object], files: Mapping[Path, str] | None = None) -> None:
     """Print what a command found, as JSON if that is asked for, else in words and with the files that it wrote.
 
-    Then OSError if there were problems with the `files`, as `write_each` gives them.
+    Then OSError if there were problems with the `files`, as `write_outputs` gives them.
     """
     written = [str(path) for path, problem in (files or {}).items() if not problem]
     if flags.as_json:

@@ -97,9 +97,9 @@ def _as_lines() -> Iterator[None]:
         finally:
             log.removeHandler(handler)
             log.setLevel(before)
-            messages = dict.fromkeys(str(it.message) for it in caught if issubclass(it.category, ours))
+            messages = dict.fromkeys(str(warning.message) for warning in caught if issubclass(warning.category, ours))
             for line in () if flags.quiet else messages:
                 say("warning", line)
-    for it in caught:
-        if not issubclass(it.category, ours):
-            warnings.showwarning(it.message, it.category, it.filename, it.lineno)
+    for warning in caught:
+        if not issubclass(warning.category, ours):
+            warnings.showwarning(warning.message, warning.category, warning.filename, warning.lineno)

@@ -7,7 +7,7 @@ from typer import Option
 
 from .console import echo, print_table, progress, value_in_words
 from .options import CutLoops, argument, output_option
-from .outputs import Output, check_outputs, tell, write_each
+from .outputs import Output, check_outputs, print_result, write_outputs
 from .reporting import WrongUsage
 
 
@@ -31,7 +31,7 @@ def run(
     if listed:
         docs = {name: comment(path) for name, path in scripts().items()}
         facts = [{"name": name, "doc": doc} for name, doc in docs.items()]
-        tell(facts, lambda: print_table(list(docs.items()), wrap=True))
+        print_result(facts, lambda: print_table(list(docs.items()), wrap=True))
         return
     if script is None or scan is None:
         raise WrongUsage("a SCRIPT and a SCAN are needed: glsk run SCRIPT SCAN -o FILE, or --list")
@@ -52,18 +52,19 @@ def run(
         layers.load_scan(scan)
         results = []
         for i, step in enumerate(steps, 1):
-            doing = f"{i} of {len(steps)}: {step.call.name}"
-            update(doing)
-            said = layers.apply_step(step, lambda record, doing=doing: update(f"{doing}, solve {record.iteration}"))
-            results.append({"filter": step.call.name, "result": _plain(said or {})})
-        files = write_each(outputs, layers, update)
+            position = f"{i} of {len(steps)}: {step.call.name}"
+            update(position)
+            solve = f"{position}, solve {{0.iteration}}"
+            result = layers.apply_step(step, lambda record, solve=solve: update(solve.format(record)))
+            results.append({"filter": step.call.name, "result": _plain(result or {})})
+        files = write_outputs(outputs, layers, update)
 
     def words() -> None:
         for i, step in enumerate(results, 1):
             facts = {name: value for name, value in step["result"].items() if name != "warnings"}
             echo(f"{i}. {step['filter']}: {value_in_words(facts)}".removesuffix(": "))
 
-    tell({"steps": results}, words, files)
+    print_result({"steps": results}, words, files)
 
 
 def _plain(result: Any) -> Any:

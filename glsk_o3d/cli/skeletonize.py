@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from . import options
 from .console import echo, flags, print_rows, progress
 from .options import option, output_option
-from .outputs import Output, check_outputs, skeleton_outputs, tell, write_each
+from .outputs import Output, check_outputs, print_result, skeleton_outputs, write_outputs
 
 if TYPE_CHECKING:
     from ..data.skeleton import Skeleton
@@ -74,11 +74,11 @@ def skeletonize(
         if support is not None:
             comparing = "comparing with the skeleton of sample {} of {}"
             skeleton = with_support(skeleton, chosen, support, on_draw=lambda *n: update(comparing.format(*n), *n))
-        files = write_each(results, skeleton, update)
+        files = write_outputs(results, skeleton, update)
     facts, doubts = summary(skeleton, seconds), skeleton.report
     supported = {"unsupported": list(map(asdict, doubts.unsupported))} if doubts.n_draws else {}
     whole = {**facts, **supported, "warnings": list(doubts.warnings)}
-    tell(whole, lambda: print_rows(_shown(facts, skeleton)), files)
+    print_result(whole, lambda: print_rows(_shown(facts, skeleton)), files)
 
 
 def _save_tubes(skeleton: Skeleton, path: Path) -> None:
@@ -120,7 +120,7 @@ def _shown(facts: Mapping[str, Any], skeleton: Skeleton) -> dict[str, Any]:
     hidden = {*ENDING_FACTS, "seconds", "agreeing", "loops_closed"}  # hardly ever true loops
     hidden |= {"sampled"} if not report.is_sampled else set()
     hidden |= {"contracted"} if facts["contracted"] == facts["distinct"] else set()
-    shown = {name: it for name, it in facts.items() if name not in hidden and (name in graph or it)}
+    shown = {name: value for name, value in facts.items() if name not in hidden and (name in graph or value)}
     shown["uncertain"] = [f"{call}; if that is wrong: --set {call.otherwise}" for call in report.uncertain]
     if report.n_draws:
         agreeing = f"{report.n_agreeing} of {report.n_draws} have the same graph"

@@ -73,13 +73,13 @@ def _page(skeleton: Skeleton, title: str, facts: Mapping[str, Mapping[str, str]]
     shown = thinned(skeleton.points, MOST_DRAWN_POINTS)
     finite = np.isfinite(skeleton.points).all(axis=1).sum()
     report, kind = skeleton.report, "Curve skeleton" if len(skeleton.vertices) else "Point cloud"
-    now = datetime.now(timezone.utc).strftime("%d %B %Y, %H:%M UTC")
+    date = datetime.now(timezone.utc).strftime("%d %B %Y, %H:%M UTC")
     more = [_section(heading, _table((), list(rows.items()))) for heading, rows in facts.items()]
     assets = files(__package__) / "assets"
     return markup(
         (assets / "report.html").read_text("utf-8"),
         title=title,
-        subtitle=f"{kind} · glsk-o3d {report.versions.get('glsk-o3d', '')} · {now}",
+        subtitle=f"{kind} · glsk-o3d {report.versions.get('glsk-o3d', '')} · {date}",
         style=Markup((assets / "report.css").read_text("utf-8")),
         counts=[markup("<div><dt>{}</dt><dd>{}</dd></div>", *item) for item in counts(skeleton).items()],
         warnings=warnings(report.warnings),
@@ -176,11 +176,11 @@ def topology(report: Report) -> Markup:
     sums = ", ".join(f"{outcome}: {n:,}" for outcome, n in sorted(outcomes.items()))
     listed = [decision for decision in report.decisions if decision.changed or decision.is_uncertain]
     listed.sort(key=lambda decision: abs(decision.probability - 0.5))
-    rows = [(it.outcome, it.question, f"{it.probability:.2f}") for it in listed[:MOST_LISTED_ROWS]]
+    rows = [(call.outcome, call.question, f"{call.probability:.2f}") for call in listed[:MOST_LISTED_ROWS]]
     hidden = len(listed) - len(rows)
     rows += [(f"and {hidden:,} clearer ones", "", "")] * (hidden > 0)
-    calls = f"{sums}; {len(report.uncertain):,} of {len(report.decisions):,} close calls."
-    return _section("Topology", _table(("done", "question", "probability"), rows), calls)
+    summary = f"{sums}; {len(report.uncertain):,} of {len(report.decisions):,} close calls."
+    return _section("Topology", _table(("done", "question", "probability"), rows), summary)
 
 
 def support(report: Report) -> Markup:

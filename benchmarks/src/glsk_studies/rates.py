@@ -9,6 +9,7 @@ import time
 import warnings
 from functools import partial
 from itertools import product
+from multiprocessing import get_context
 from pathlib import Path
 from statistics import median
 from unittest.mock import patch
@@ -18,7 +19,6 @@ from glsk_bench.scanning import depth_image, places_at
 from glsk_bench.shapes import shape
 
 from glsk_o3d import SkeletonWarning, skeletonize
-from glsk_o3d.apps.batch import Skeletonizer
 from glsk_o3d.data.skeleton import ARRAYS
 from glsk_o3d.geometry.cores import cores
 
@@ -100,11 +100,11 @@ def measure_stream(sizes: list[int], families: list[str], repeat: int) -> list[d
         expected = [skeletonize(frame) for frame in seen]
         for workers in sorted({1, cores()}):
             spent = []
-            with Skeletonizer(workers=workers) as skeletonizer:
-                list(skeletonizer.stream(seen[: 2 * workers]))
+            with get_context("spawn").Pool(workers) as pool:
+                pool.map(skeletonize, seen[: 2 * workers])
                 for _ in range(repeat):
                     start = time.perf_counter()
-                    found = list(skeletonizer.stream(seen))
+                    found = list(pool.imap(skeletonize, seen))
                     spent.append((time.perf_counter() - start) / FRAMES)
             same = all(
                 np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True)

@@ -1,5 +1,4 @@
 from .plan import Plan, plan_batch
 from .run import BatchResult, run_batch
-from .stream import Skeletonizer
 
-__all__ = ["BatchResult", "Plan", "Skeletonizer", "plan_batch", "run_batch"]
+__all__ = ["BatchResult", "Plan", "plan_batch", "run_batch"]

@@ -25,7 +25,7 @@ LONGEST_STUB = 2.0  # fitted: of its scale, up to which what ends at a seam is t
 
 RADIUS, SCALE = 3, 5
 """Columns of the values of `Strands`."""
-MADE, BORDER, INNER = 0, 1, 2
+CROSSING, BORDER, INNER = 0, 1, 2
 """Columns of marks: vertices put where an edge crosses a plane, cut ends at the border of what counts, and cut ends
 where the curve goes on in what is there already."""
 
@@ -124,7 +124,7 @@ class Strands:
 
     def mended(self) -> Strands:
         """Without the vertices that were made in vain, in the middle of edges that went on."""
-        kept = ~self.marks[:, MADE] | self.marks[:, [BORDER, INNER]].any(axis=1) | (self.degree != 2)
+        kept = ~self.marks[:, CROSSING] | self.marks[:, [BORDER, INNER]].any(axis=1) | (self.degree != 2)
         paths = (np.compress(kept[path], path) for path, _ in maximal_paths(len(kept), self.edges))
         links = [np.empty((0, 2), np.int64), *(np.stack([path[:-1], path[1:]], axis=1) for path in paths)]
         return Strands(self.values, simple_edges(np.concatenate(links)), self.marks)._compact(kept)
@@ -193,13 +193,13 @@ def join_tiles(skeletons: Mapping[Tile, Skeleton], grid: Grid) -> tuple[Skeleton
         if near:
             theirs = Samples(*map(np.concatenate, zip(*(brought[other] for other in near), strict=True)))
         if theirs is not None and len(theirs.places):
-            strands, met = _not_there(strands, theirs, grid, tile, near)
+            strands, met = _new_strands(strands, theirs, grid, tile, near)
             joint.met.append(met)
         brought[tile] = joint.bring(strands, theirs)
     return joint.finished()
 
 
-def _not_there(
+def _new_strands(
     strands: Strands, theirs: Samples, grid: Grid, tile: Tile, near: Sequence[Tile]
 ) -> tuple[Strands, np.ndarray]:
     """What others have not brought, and the values of the ends of the object that they have."""
@@ -232,7 +232,7 @@ class _Joint:
         self._edges = [np.empty((0, 2), np.int64)]
         self._merged: list[tuple[int, int]] = []  # a cut end, and the earlier one that is the same place
         self._touching: list[tuple[int, int]] = []  # a cut end that found none, and the earlier vertex nearest to it
-        self._open: dict[int, np.ndarray] = {}  # the values of cut ends that nobody has gone on from
+        self._open: dict[int, np.ndarray] = {}  # the values of cut ends that nobody has stubs on from
         self.met = [np.empty((0, 8))]  # ends of the object that others brought: there a cut end has nothing to meet
         self.thickest = 0.0
 
@@ -260,11 +260,11 @@ class _Joint:
         """Match cut ends with open ones, the nearest first, one to one; others touch what is nearest."""
         known = set(theirs.vertex.tolist())
         waiting = {at: values for at, values in self._open.items() if at in known}
-        mine, others = (np.array(list(points.values())).reshape(-1, 8) for points in (ends, waiting))
-        one_of, other_of = list(ends), list(waiting)
+        own, others = (np.array(list(points.values())).reshape(-1, 8) for points in (ends, waiting))
+        inner_end, open_end = list(ends), list(waiting)
         loose = dict(ends)
-        for row, column in matched(mine[:, :3], others[:, :3], mine[:, None, SCALE] + others[:, SCALE]):
-            one, other = one_of[row], other_of[column]
+        for row, column in matched(own[:, :3], others[:, :3], own[:, None, SCALE] + others[:, SCALE]):
+            one, other = inner_end[row], open_end[column]
             self._merged.append((one, other))
             del loose[one], self._open[other]
         if loose:
@@ -287,8 +287,8 @@ class _Joint:
         edges, loose = simple_edges(np.concatenate([edges, touching[tied]])), touching[~tied, 0]
         ends = np.concatenate([np.array(list(self._open), np.int64), loose])
         ends = ends[np.bincount(edges.ravel(), minlength=len(values))[ends] < 2]  # where curves fork, some go on
-        gone, ends = _stubs(values, edges, ends)
-        alive[gone] = False
+        stubs, ends = _stubs(values, edges, ends)
+        alive[stubs] = False
         edges = edges[alive[edges].all(axis=1)]
         met = np.concatenate(self.met)
         if len(met):  # where an end of the object is beside a cut end, another tile saw it: there is nothing to meet

@@ -265,7 +265,7 @@ def _why(task: Task, ledger: Ledger, parameters: str) -> str:
     if not all(name in row["outputs"] and Path(task.out_dir, name).is_file() for name in task.outputs):
         return "outputs are gone"
     try:
-        now = file_hash(task.path)
+        current_hash = file_hash(task.path)
     except OSError:  # gone, or not to be read: the worker will say so
         return "input changed"
-    return UP_TO_DATE if now == row.get("input_hash") else "input changed"
+    return UP_TO_DATE if current_hash == row.get("input_hash") else "input changed"

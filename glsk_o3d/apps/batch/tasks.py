@@ -53,14 +53,14 @@ def work(task: Task) -> Row:
     """Skeletonise a cloud and write the results; gives what the ledger is to say, whatever goes wrong."""
     start = time.perf_counter()
     row: Row = {"status": DONE, "error": "", "worker": f"{socket.gethostname()}, process {os.getpid()}"}
-    with _logged_warnings() as heard:
+    with _logged_warnings() as messages:
         try:
             with suppress(OSError):  # what it is shows when it is read
                 row["input_hash"] = file_hash(task.path)
-            _skeletonize(task, row, heard)
+            _skeletonize(task, row, messages)
         except Exception as error:  # whatever it is, the other clouds are to be done
             row |= failure(in_one_line(error).removeprefix(f"{task.path}: "))
-    messages = list(dict.fromkeys(heard))
+    messages = list(dict.fromkeys(messages))
     row |= {"seconds": round(time.perf_counter() - start, 4), "warnings": len(messages), "messages": messages}
     return {**row, "version": __version__, "finished": datetime.now(timezone.utc).isoformat(timespec="seconds")}
 

@@ -25,7 +25,7 @@ from . import agreement, operators
 from .mesh import mesh_skeleton
 from .solid import Solid, ball_pivoting, given, poisson
 
-MADE_BY = ("auto", "poisson", "ball_pivoting")
+MESH_KINDS = ("auto", "poisson", "ball_pivoting")
 COMPARISON_STEP = 0.002  # precision: of the diagonal: spacing of the places where skeletons are compared
 LEAST_SURFACE = 1e-9  # precision: of a surface in the working frame
 DOUBTFUL_ANGLE = 30.0  # measured: degrees by which the mean curvature vectors differ where points are doubtful
@@ -125,8 +125,8 @@ def cross_check(cloud: Any, *, pipeline: Pipeline[Any, Any] | str = "default", m
     kinds = [type(stage) for stage in pipeline.stages]
     if RingBuilder not in kinds or Contractor not in kinds:
         raise InvalidParameterError(f"pipeline = {pipeline!r}: must have a RingBuilder and a Contractor")
-    if isinstance(mesh, str) and mesh not in MADE_BY:
-        raise InvalidParameterError(f"mesh = {mesh!r}: must be one of {MADE_BY}, a mesh, or (vertices, faces)")
+    if isinstance(mesh, str) and mesh not in MESH_KINDS:
+        raise InvalidParameterError(f"mesh = {mesh!r}: must be one of {MESH_KINDS}, a mesh, or (vertices, faces)")
     require("igl")  # before the work that it is for
     rings = kinds.index(RingBuilder)
     builder: Any = pipeline.stages[rings]

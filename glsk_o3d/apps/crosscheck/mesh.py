@@ -38,8 +38,8 @@ def mesh_skeleton(solid: Solid, pipeline: Pipeline[Any, Any]) -> Skeleton:
     rest = [replace(stage, bridge=0) if isinstance(stage, Refiner) else stage for stage in rest]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SkeletonWarning)
-        begun, faces = mesh_state(solid)
-        return Pipeline(*rest)(contractor.contract(begun, lambda state: mesh_laplacian(state.positions, faces)))
+        state, faces = mesh_state(solid)
+        return Pipeline(*rest)(contractor.contract(state, lambda current: mesh_laplacian(current.positions, faces)))
 
 
 def mesh_state(solid: Solid) -> tuple[Contraction, np.ndarray]:
@@ -53,13 +53,13 @@ def mesh_state(solid: Solid) -> tuple[Contraction, np.ndarray]:
     rings, area = Rings.of_faces(len(positions), faces), igl.massmatrix(positions, faces).diagonal()
     normals = igl.per_vertex_normals(positions, faces)
     places, trust = mean_places(positions, normals, rings, *inscribed_balls(positions, normals))
-    begun = replace(
+    state = replace(
         state,
         map=replace(state.map, survivors=survivors, survivor_of_row=cKDTree(positions).query(state.cloud)[1]),
         mass=np.maximum(area / area.mean(), LEAST_MASS),
         **at_rest(positions, rings),
     )
-    return replace(begun, positions=positions + trust[:, None] * (places - positions)), faces
+    return replace(state, positions=positions + trust[:, None] * (places - positions)), faces
 
 
 def mesh_laplacian(vertices: np.ndarray, faces: np.ndarray, cap: float = WEIGHT_CAP) -> Any:

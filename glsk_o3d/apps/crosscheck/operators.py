@@ -34,19 +34,19 @@ def compare_operators(
     length = DIFFUSION * edge
     phases = (np.pi * (operator.places - low) / np.maximum(high - low, TINY) for operator in (ours, theirs))
     waves = [np.cos(np.column_stack([phase, 2 * phase])) for phase in phases]  # half a wave and a whole one across
-    mine = mapped(ours, np.column_stack([ours.places, waves[0]]), length)
+    own = mapped(ours, np.column_stack([ours.places, waves[0]]), length)
     other = mapped(theirs, np.column_stack([theirs.places, waves[1]]), length)
     squared, face, foot = igl.point_mesh_squared_distance(ours.places, solid.vertices, solid.faces)
     corners = solid.faces[face]
     share = igl.barycentric_coordinates(foot, *(solid.vertices[corner] for corner in corners.T))
     other = np.einsum("nk,nkc->nc", share, other[corners])
 
-    near, a, b = squared < (WITHIN * edge) ** 2, norm(mine[:, :3]), norm(other[:, :3])
+    near, a, b = squared < (WITHIN * edge) ** 2, norm(own[:, :3]), norm(other[:, :3])
     flat = near & (np.maximum(a, b) * length**2 < FLAT * edge)
     bent = near & ~flat
-    cosine = dot(mine[:, :3], other[:, :3]) / np.maximum(a * b, TINY)
+    cosine = dot(own[:, :3], other[:, :3]) / np.maximum(a * b, TINY)
     angle = np.where(flat, 0, np.where(near, np.degrees(np.arccos(np.clip(cosine, -1, 1))), np.nan))
-    difference, size = (ours.area[near] @ vectors[near, 3:] ** 2 for vectors in (mine - other, other))
+    difference, size = (ours.area[near] @ vectors[near, 3:] ** 2 for vectors in (own - other, other))
     both = np.array([*zip(eigenvalues(ours, eigs), eigenvalues(theirs, eigsh), strict=False)])
     positive = both[both[:, 1] * theirs.area.sum() > 1]
     agreement = OperatorAgreement(

@@ -98,8 +98,8 @@ class Layer:
     def shows(self, other: Layer) -> bool:
         """Whether both have the same vertices and edges, so that the one's skeleton is still the other's."""
         none = np.empty((0, 2), int)
-        mine, its = (none if layer.edges is None else layer.edges for layer in (self, other))
-        return np.array_equal(self.vertices, other.vertices) and np.array_equal(mine, its)
+        own_edges, other_edges = (none if layer.edges is None else layer.edges for layer in (self, other))
+        return np.array_equal(self.vertices, other.vertices) and np.array_equal(own_edges, other_edges)
 
     def cloud(self) -> SurfaceMesh:
         """The vertices and faces of a layer that is a scan; InvalidCloudError for a skeleton."""

@@ -37,8 +37,8 @@ class Step:
             yield
         except GlskError as error:
             place = f"{self.place}: " if self.place else ""
-            said = str(error).replace("drop_invalid (--drop-invalid)", "the parameter sampler_drop_invalid")
-            raise ScriptError(f"{place}filter {self.call.name!r}: {said}") from error
+            message = str(error).replace("drop_invalid (--drop-invalid)", "the parameter sampler_drop_invalid")
+            raise ScriptError(f"{place}filter {self.call.name!r}: {message}") from error
 
 
 def step(verb: Verb, values: Mapping[str, Any]) -> Step:

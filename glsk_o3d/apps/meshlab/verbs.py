@@ -15,7 +15,7 @@ from ...parameters import Parameters, parameter, problem_with, resolve_length, s
 from ...pipeline import Pipeline, parts
 from ...recipes.catalogue import catalogue, known_pipelines, named_pipeline, serves, value_from_text
 from ..crosscheck import cross_check
-from ..crosscheck.check import MADE_BY
+from ..crosscheck.check import MESH_KINDS
 from .layers import Layer
 from .script import Param
 
@@ -175,7 +175,7 @@ def verbs() -> dict[str, Verb]:
         "Whether the skeleton of the current layer agrees with that of a mesh by libigl's Laplacian: a verdict, and "
         "the points with the angle between both Laplacians in degrees as scalar."
     )
-    mesh = Slot("mesh", parameter("auto", "What the mesh is made by.", type="choice", choices=MADE_BY).metadata)
+    mesh = Slot("mesh", parameter("auto", "What the mesh is made by.", type="choice", choices=MESH_KINDS).metadata)
     layer = Slot("layer", parameter(None, "The layer to act on; -1 is the current one.", type="int", low=-1).metadata)
     slots = {slot.name: slot for slot in (*_slots_of_all(), layer)}
     of_check = {"pipeline": slots["pipeline"], "mesh": mesh, "layer": layer}

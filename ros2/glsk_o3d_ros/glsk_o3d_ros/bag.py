@@ -62,10 +62,11 @@ def convert(source: Path, target: Path, topic: str, **options: Any) -> int:
     types = get_typestore(Stores.ROS2_HUMBLE)  # later ones have the same clouds, markers and poses
     skeletonize = Skeletonizer(maker(types), **options)
     with AnyReader([source], default_typestore=types) as reader:
-        clouds = [each for each in reader.connections if each.topic == topic and each.msgtype == CLOUD]
+        sources = [connection for connection in reader.connections if connection.msgtype == CLOUD]
+        clouds = [connection for connection in sources if connection.topic == topic]
         if not clouds:
-            there = ", ".join(sorted({each.topic for each in reader.connections if each.msgtype == CLOUD}))
-            raise AnyReaderError(f"{source}: has no clouds on {topic}; there are some on {there or 'no topic'}")
+            topics = ", ".join(sorted({connection.topic for connection in sources}))
+            raise AnyReaderError(f"{source}: has no clouds on {topic}; there are some on {topics or 'no topic'}")
         done = 0
         with Writer(target, version=8) as writer:
             out = {

@@ -86,7 +86,7 @@ class Skeletonizer:
         points = points[np.isfinite(points).all(axis=1)]
         if len(points) < self.min_points:
             raise InvalidCloudError(f"the cloud has {len(points)} finite points, and min_points is {self.min_points}")
-        with warnings.catch_warnings(record=True) as said:
+        with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("ignore")
             warnings.simplefilter("always", SkeletonWarning)
             skeleton = self.pipeline(points)
@@ -98,5 +98,5 @@ class Skeletonizer:
             markers_of(skeleton, cloud.header, self.make),
             poses_of(frames, cloud.header, self.make),
             skeleton,
-            tuple(str(warning.message) for warning in said),
+            tuple(str(warning.message) for warning in caught),
         )

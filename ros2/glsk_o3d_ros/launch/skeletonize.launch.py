@@ -21,8 +21,8 @@ def generate_launch_description():
     """The node, and the arguments of the launch file."""
     arguments = [DeclareLaunchArgument("input", description="Topic of the clouds.")]
     arguments += [
-        DeclareLaunchArgument(name, default_value=default, description=told)
-        for name, (_, default, told) in PARAMETERS.items()
+        DeclareLaunchArgument(name, default_value=default, description=meaning)
+        for name, (_, default, meaning) in PARAMETERS.items()
     ]
     node = Node(
         package="glsk_o3d_ros",
