@@ -2,7 +2,6 @@
 
 import json
 
-import numpy as np
 import pytest
 
 from glsk_o3d import read_skeleton
@@ -67,15 +66,3 @@ def test_options_reach_the_run(invoke, folder, scans, tmp_path, at_once):
     assert at_once == [2]
     assert "2 of 1000 points" in invoke("batch", scans / "nan.ply", "-o", "out").stderr
     assert invoke("batch", scans / "nan.ply", "-o", "out", "--drop-invalid").exit_code == 0
-
-
-def test_one_skeleton_of_a_scene_in_tiles(invoke, tmp_path):
-    rings = np.concatenate([torus(300).points + [3 * i, 0, 0] for i in range(3)])
-    np.savetxt(tmp_path / "plot.csv", rings, delimiter=",", header="x,y,z", comments="")
-    words = ["batch", "plot.csv", "-o", "tiles", "--tiles", "3", "--overlap", "0.5", "--json"]
-    facts = json.loads(invoke(*words).stdout)
-    assert (facts["done"] > 3, facts["failed"]) == (True, 0)
-    plan = json.loads(invoke(*words, "--dry-run").stdout)
-    assert plan["tasks"][0]["input"] == f"{tmp_path}/plot.csv tile 0-0-0"
-    assert (plan["todo"], plan["skipped"]) == (0, facts["done"])
-    assert read_skeleton("tiles/plot.ply").n_loops == 3

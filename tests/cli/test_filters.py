@@ -82,9 +82,3 @@ def test_what_is_broken_or_no_application_is_left_out(glsk, capsys, value):
     warning = capsys.readouterr().err
     assert warning.count("\n") == 1
     assert warning.startswith(f"glsk: warning: the command 'broken' ({value}) is left out: ")
-
-
-def test_a_malformed_file_of_another_distribution_stops_no_command(glsk, install, capsys):
-    install("glsk-odd", "1", "", "[glsk_o3d.commands]\nno equals sign\n")
-    assert glsk("own").exit_code == 0
-    assert capsys.readouterr().err.startswith("glsk: warning: all plugins left out: ")

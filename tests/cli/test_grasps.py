@@ -51,10 +51,3 @@ def test_the_points_come_from_a_file(invoke, tmp_path, rod, write_scan):
     assert facts["found"] == len(facts["grasps"]) > 9
     assert min(row["approach"][1] for row in facts["grasps"]) > -1e-9
     assert {row["confidence"] for row in facts["grasps"]} == {None}
-
-
-def test_no_grasp_is_a_warning(invoke, rod):
-    result = invoke("grasps", rod, "--opening", 0.15)
-    assert result.exit_code == 0
-    assert result.stderr == "glsk: warning: no grasp at 9 places: 9 too wide\n"
-    assert result.stdout == "0 grasps at 9 places\nleft out: 9 too wide\n"

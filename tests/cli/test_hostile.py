@@ -68,14 +68,3 @@ def test_numbers_too_long_for_any_are_refused(invoke, y, number, words):
     result = invoke(*words.format(number).split())
     assert result.exit_code == 2, result.output
     assert "rror: " in result.output
-
-
-def test_a_file_that_may_not_be_read_is_one_line(refused, tmp_path, monkeypatch):
-    np.savetxt(tmp_path / "s.xyz", torus(300).points)
-    monkeypatch.setattr("os.access", lambda *_, **__: False)
-
-    def refuse(path, where):
-        raise PermissionError(13, "Permission denied", str(path))
-
-    monkeypatch.setattr("glsk_o3d.io.streaming.read_scan", refuse)
-    assert refused(1, "skeletonize", "s.xyz", "-o", "o.json") == "s.xyz: Permission denied"

@@ -73,13 +73,6 @@ def test_skeletons_of_every_format_and_the_report_of_the_run(told, skeleton, inv
     assert told("close.json")["uncertain"] == [str(call)]
 
 
-def test_coordinates_of_a_map_keep_their_digits(invoke, told, tmp_path):
-    corner = np.array([471234.5678, 5612345.6789, 123.4567])
-    np.savetxt(tmp_path / "far.xyz", corner + np.eye(3), fmt="%.4f")
-    assert told("far.xyz")["lowest"] == corner.tolist()
-    assert "471234.5678  5612345.679  123.4567" in invoke("info", "far.xyz").stdout
-
-
 def test_attributes_and_conditions_on_them(invoke, told, refused, tmp_path):
     rows = [f"{i},{i * i},0,{i % 3},{i / 7}" for i in range(30)]
     (tmp_path / "c.csv").write_text("\n".join(["x,y,z,Tree ID,intensity", *rows]))

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from glsk_o3d import Skeleton, pipelines, read_skeleton, samples, save_skeleton
+from glsk_o3d import read_skeleton
 from glsk_o3d.analysis import branch_table, cylinders, tree_measures
 from glsk_o3d.cli.console import value_in_words
 
@@ -46,21 +46,6 @@ def test_tree_lines_file_and_json_agree(invoke, tmp_path, y):
     assert (facts["volume"], facts["stem_diameter"]) == (list(measures.volume), None)  # it is not so high
     assert (facts["unit"], facts["up"]) == (1, "z")
     assert invoke("tree", y, "-q").stdout == ""
-
-
-def test_a_stem_and_why_it_has_no_diameter(invoke, tmp_path):
-    save_skeleton(pipelines.tree()(samples.tree(4000, forks=2, length=2, seed=1).points), tmp_path / "t.json")
-    found = tree_measures(read_skeleton(tmp_path / "t.json"))
-    facts = json.loads(invoke("tree", "t.json", "--json").stdout)
-    assert (facts["stem_arc"], facts["doubts"]) == (found.stem_arc, [])
-    assert f"stem diameter  {found.stem_diameter:.6g}\n" in invoke("tree", "t.json").stdout
-    points = [[0, 0, 0], [0, 0, 1], [3, 0, 1], [0, 0, 2.5]]
-    bent = Skeleton(points, [[0, 1], [1, 2], [1, 3]], [0.2, 0.2, 0.2, 0.01], (), (), ())
-    save_skeleton(bent, tmp_path / "t.json")
-    result = invoke("tree", "t.json", "--root", "z", "--up", "x", "--json")
-    why = "the diameter of the stem at 1.3 m is not known: the stem does not pass 1.3 m above its foot"
-    assert result.stderr.splitlines()[-1].endswith(why)
-    assert json.loads(result.stdout)["doubts"][-1] == why
 
 
 def test_units_what_is_up_and_cylinders_in_the_units_of_the_file(invoke, tmp_path, y):

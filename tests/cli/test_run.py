@@ -82,14 +82,6 @@ def test_the_list_says_what_each_script_does(invoke):
     assert all(len(each["doc"]) > 40 for each in told.values())
 
 
-def test_measures_are_plain(invoke, script, tmp_path):
-    mesh = o3d.geometry.TriangleMesh.create_torus(radial_resolution=40)
-    assert o3d.io.write_triangle_mesh(str(tmp_path / "m.ply"), mesh)
-    (step,) = json.loads(invoke("run", script("Compute Geometric Measures"), "m.ply", "--json").stdout)["steps"]
-    assert np.shape(step["result"]["inertia_tensor"]) == (3, 3)
-    assert step["result"]["bbox"]["max"] == pytest.approx([1.5, 1.5, 0.5])
-
-
 def test_points_that_are_not_finite_and_loops(invoke, refused, scans, script, tmp_path):
     name, parameter = "Generate Curve Skeleton (GLSkeleton)", "sampler_drop_invalid"
     line = refused(1, "run", script(name), scans / "nan.ply", "-o", "s.ply")

@@ -1,14 +1,11 @@
 """What `glsk skeletonize` takes, refuses and says."""
 
 import json
-import logging
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-import glsk_o3d
 from glsk_o3d import annotate, load_recipe, read_skeleton, read_tensor_cloud, samples, save_recipe, to_recipe, to_tubes
 from glsk_o3d.io import streaming
 from glsk_o3d.io.scans import read_blocks, read_mesh
@@ -85,19 +82,6 @@ def test_warnings_json_and_quiet(invoke, scans, tmp_path):
     result = invoke(*words, "--quiet")
     assert (result.exit_code, result.output) == (0, "")
     assert (tmp_path / "s.ply").is_file()
-
-
-def test_verbose_shows_each_iteration_the_log_and_where_an_error_comes_from(invoke, scans):
-    log = logging.getLogger("glsk_o3d")
-    level = log.level
-    result = invoke("skeletonize", scans / "sample.ply", "-o", "s.ply", "--verbose")
-    assert "glsk: Connector took" in result.stderr
-    assert "glsk: solve 1: 1100 points" in result.stderr
-    result = invoke("skeletonize", scans / "nan.ply", "-o", "s.ply", "--verbose")
-    assert result.exit_code == 1
-    assert "Traceback" in result.stderr
-    assert result.stderr.splitlines()[-1].startswith(f"glsk: error: {scans / 'nan.ply'}: 2 of 1000 points")
-    assert (log.level, log.handlers) == (level, [])
 
 
 # ------------------------------------------------------------------------------------------------ results as recipes
@@ -199,19 +183,6 @@ def test_a_large_scan_is_read_in_blocks(invoke, tmp_path, write_scan, monkeypatc
 
 
 # -------------------------------------------------------------------------------------------------- doubts about a run
-
-
-def test_a_close_call_comes_with_the_option_that_answers_otherwise(invoke, scans, monkeypatch):
-    call = glsk_o3d.Decision("gap", (1.0, 2.0, 3.0), 0.42, changed=False)
-    real = glsk_o3d.Refiner.run
-
-    def doubtful(self, data, watch):
-        skeleton = real(self, data, watch)
-        return replace(skeleton, report=replace(skeleton.report, decisions=(call,)))
-
-    monkeypatch.setattr(glsk_o3d.Refiner, "run", doubtful)
-    told = "the object goes on across the gap at (1, 2, 3): 0.42, gap left; if that is wrong: --set Refiner.bridge=0.41"
-    assert told in invoke("skeletonize", scans / "ring.ply", "-o", "s.json").stdout
 
 
 def test_support_is_told_and_shown(invoke, scans, tmp_path):

@@ -155,12 +155,33 @@ class Seams(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """Places along curves that are there."""
+    """Places along the curves of earlier tiles."""
 
     places: np.ndarray  # (m, 3)
     scale: np.ndarray  # (m,)
     vertex: np.ndarray  # (m,) number of the nearer end of the edge
     outward: np.ndarray  # (m, 3) where the curve would go on, at cut ends; 0 elsewhere
+
+    @classmethod
+    def of(cls, strands: Strands, first: int) -> Samples:
+        """Vertices, of which the first has that number, and places between them."""
+        places, edges = strands.values[:, :3], strands.edges
+        row, part, between = np.empty(0, int), np.empty(0), np.empty((0, 8))
+        if len(edges):
+            scale = np.fmax(np.fmin(*strands.values[edges, SCALE].T), np.finfo(float).tiny)
+            length = norm(places[edges[:, 1]] - places[edges[:, 0]])
+            row, part = pieces(places, edges, np.fmax(SAMPLE_STEP * scale, length / MOST_SAMPLES))
+            between = along(edges, row, part, strands.values)
+        values = np.concatenate([strands.values, between])
+        vertex = np.concatenate([np.arange(len(places)), edges[row, (part > 0.5).astype(int)]])
+        outward = np.concatenate([strands.outward(), np.zeros((len(row), 3))])
+        return cls(values[:, :3], values[:, SCALE], first + vertex, outward)
+
+    def covers(self, values: np.ndarray) -> np.ndarray:
+        """Which places are on these curves: no farther away than either is thick, and not past a cut end."""
+        distance, nearest = cKDTree(self.places).query(values[:, :3])
+        past = dot(values[:, :3] - self.places[nearest], self.outward[nearest]) > 0
+        return (distance <= np.fmax(values[:, SCALE], self.scale[nearest])) & ~past
 
 
 def join_tiles(skeletons: Mapping[Tile, Skeleton], grid: Grid) -> tuple[Skeleton, Seams]:
@@ -180,125 +201,117 @@ def join_tiles(skeletons: Mapping[Tile, Skeleton], grid: Grid) -> tuple[Skeleton
     >>> ring.n_components, ring.n_loops, seams.joined, seams.unmatched
     (1, 1, 4, 0)
     """
-    joint = _Joint()
-    brought: dict[Tile, Samples] = {}
+    union = _Union()
+    samples: dict[Tile, Samples] = {}
     for tile in sorted(skeletons):
-        near = [other for other in brought if max(abs(a - b) for a, b in zip(other, tile, strict=True)) <= 1]
+        near = [other for other in samples if max(abs(a - b) for a, b in zip(other, tile, strict=True)) <= 1]
         strands = Strands.of(skeletons[tile]).within(*grid.box(tile, grid.trust))
         # the skeleton of a part within reach of a cut through the points is not to be trusted
         cut = ~inside(strands.values, *grid.box(tile, grid.overlap), CUT_REACH * strands.values[:, RADIUS])
-        joint.thickest = float(np.nanmax(strands.values[cut, RADIUS], initial=joint.thickest))
+        union.thickest = float(np.nanmax(strands.values[cut, RADIUS], initial=union.thickest))
         strands = strands.with_pieces(strands.touching(*grid.box(tile, CLAIM_SHARE * grid.trust)))
-        theirs = None
-        if near:
-            theirs = Samples(*map(np.concatenate, zip(*(brought[other] for other in near), strict=True)))
-        if theirs is not None and len(theirs.places):
-            strands, met = _new_strands(strands, theirs, grid, tile, near)
-            joint.met.append(met)
-        brought[tile] = joint.bring(strands, theirs)
-    return joint.finished()
+        earlier = Samples(*map(np.concatenate, zip(*(samples[other] for other in near), strict=True))) if near else None
+        if earlier is not None and len(earlier.places):
+            strands, tips = _new_strands(strands, earlier, grid, tile, near)
+            union.tips.append(tips)
+        samples[tile] = union.add(strands, earlier)
+    return union.skeleton()
 
 
 def _new_strands(
-    strands: Strands, theirs: Samples, grid: Grid, tile: Tile, near: Sequence[Tile]
+    strands: Strands, earlier: Samples, grid: Grid, tile: Tile, near: Sequence[Tile]
 ) -> tuple[Strands, np.ndarray]:
-    """What others have not brought, and the values of the ends of the object that they have."""
+    """What earlier tiles lack, and the values of the ends of the object that they have."""
     for axis, value in grid.seams(tile):
         strands = strands.split(axis, value)
-    known = _covered(strands.middles, theirs)
-    ends = (strands.degree == 1) & ~strands.marks[:, BORDER]
-    ends[strands.edges[~known]] = False
-    new = strands.keep(~known, ~_covered(strands.values, theirs), INNER)
-    # a stretch of a curve that others saw, too, and elsewhere, is theirs; unless they have nothing there at all
+    covered = earlier.covers(strands.middles)
+    tips = (strands.degree == 1) & ~strands.marks[:, BORDER]
+    tips[strands.edges[~covered]] = False
+    new = strands.keep(~covered, ~earlier.covers(strands.values), INNER)
+    # a stretch of a curve that is also in the box of an earlier tile, but elsewhere in its skeleton, is that tile's;
+    # unless that has nothing of the whole piece
     middles, labels = new.middles, new.pieces
-    seen = np.any([inside(middles, *grid.box(other, grid.trust), middles[:, SCALE]) for other in near], axis=0)
+    shared = np.any([inside(middles, *grid.box(other, grid.trust), middles[:, SCALE]) for other in near], axis=0)
     own = ~np.isin(labels, labels[new.marks[:, INNER]])
-    own[new.edges[~seen]] = True
-    return new.with_pieces(own).mended(), strands.values[ends]
+    own[new.edges[~shared]] = True
+    return new.with_pieces(own).mended(), strands.values[tips]
 
 
-def _covered(values: np.ndarray, theirs: Samples) -> np.ndarray:
-    """Which places are on curves that are there: no farther from them than either is thick, and not past a cut end."""
-    distance, nearest = cKDTree(theirs.places).query(values[:, :3])
-    past = dot(values[:, :3] - theirs.places[nearest], theirs.outward[nearest]) > 0
-    return (distance <= np.fmax(values[:, SCALE], theirs.scale[nearest])) & ~past
-
-
-class _Joint:
-    """What has been brought so far. Vertices are numbered through."""
+class _Union:
+    """The strands of all tiles so far. Vertices are numbered through."""
 
     def __init__(self) -> None:
         self._values = [np.empty((0, 8))]
         self._edges = [np.empty((0, 2), np.int64)]
         self._merged: list[tuple[int, int]] = []  # a cut end, and the earlier one that is the same place
-        self._touching: list[tuple[int, int]] = []  # a cut end that found none, and the earlier vertex nearest to it
-        self._open: dict[int, np.ndarray] = {}  # the values of cut ends that nobody has stubs on from
-        self.met = [np.empty((0, 8))]  # ends of the object that others brought: there a cut end has nothing to meet
+        self._touching: list[tuple[int, int]] = []  # a cut end without such a one, and the earlier vertex nearest to it
+        self._open: dict[int, np.ndarray] = {}  # the values of cut ends at the border that nothing continues
+        self.tips = [np.empty((0, 8))]  # ends of the object in several tiles: there a cut end has no counterpart
         self.thickest = 0.0
 
-    def bring(self, strands: Strands, theirs: Samples | None) -> Samples:
-        """Add what a tile brings, and join its inner cut ends to what others did; gives it as samples."""
+    def add(self, strands: Strands, earlier: Samples | None) -> Samples:
+        """Add the strands of a tile, join their inner cut ends to earlier ones, and sample them."""
         first = sum(map(len, self._values))
         self._values.append(strands.values)
         self._edges.append(strands.edges + first)
         border, inner = strands.marks[:, BORDER], strands.marks[:, INNER]
-        self._open |= {first + at: strands.values[at] for at in np.flatnonzero(border & ~inner).tolist()}
+        self._open |= {first + row: strands.values[row] for row in np.flatnonzero(border & ~inner).tolist()}
         if inner.any():
-            assert theirs is not None
-            self._meet({first + at: strands.values[at] for at in np.flatnonzero(inner).tolist()}, theirs)
-        places, edges = strands.values[:, :3], strands.edges
-        scale = np.fmax(np.fmin(*strands.values[edges, SCALE].T), np.finfo(float).tiny)
-        step = np.fmax(SAMPLE_STEP * scale, norm(places[edges[:, 1]] - places[edges[:, 0]]) / MOST_SAMPLES)
-        row, part = pieces(places, edges, step) if len(edges) else (np.empty(0, int), np.empty(0))
-        between = along(edges, row, part, strands.values) if len(edges) else np.empty((0, 8))
-        values = np.concatenate([strands.values, between])
-        vertex = np.concatenate([np.arange(len(places)), edges[row, (part > 0.5).astype(int)]])
-        outward = np.concatenate([strands.outward(), np.zeros((len(row), 3))])
-        return Samples(values[:, :3], values[:, SCALE], first + vertex, outward)
+            assert earlier is not None
+            self._match({first + row: strands.values[row] for row in np.flatnonzero(inner).tolist()}, earlier)
+        return Samples.of(strands, first)
 
-    def _meet(self, ends: dict[int, np.ndarray], theirs: Samples) -> None:
-        """Match cut ends with open ones, the nearest first, one to one; others touch what is nearest."""
-        known = set(theirs.vertex.tolist())
-        waiting = {at: values for at, values in self._open.items() if at in known}
-        own, others = (np.array(list(points.values())).reshape(-1, 8) for points in (ends, waiting))
-        inner_end, open_end = list(ends), list(waiting)
-        loose = dict(ends)
-        for row, column in matched(own[:, :3], others[:, :3], own[:, None, SCALE] + others[:, SCALE]):
-            one, other = inner_end[row], open_end[column]
-            self._merged.append((one, other))
-            del loose[one], self._open[other]
-        if loose:
-            nearest = cKDTree(theirs.places).query(np.array(list(loose.values()))[:, :3])[1]
-            self._touching += zip(loose, theirs.vertex[nearest].tolist(), strict=True)
+    def _match(self, inner: dict[int, np.ndarray], earlier: Samples) -> None:
+        """Match inner cut ends with open ones, the nearest first, one to one; others touch what is nearest."""
+        known = set(earlier.vertex.tolist())
+        border = {vertex: values for vertex, values in self._open.items() if vertex in known}
+        a, b = (np.array(list(ends.values())).reshape(-1, 8) for ends in (inner, border))
+        inner_ends, border_ends, unmatched = list(inner), list(border), dict(inner)
+        for row, column in matched(a[:, :3], b[:, :3], a[:, None, SCALE] + b[:, SCALE]):
+            pair = inner_ends[row], border_ends[column]
+            self._merged.append(pair)
+            del unmatched[pair[0]], self._open[pair[1]]
+        if unmatched:
+            nearest = cKDTree(earlier.places).query(np.array(list(unmatched.values()))[:, :3])[1]
+            self._touching += zip(unmatched, earlier.vertex[nearest].tolist(), strict=True)
 
-    def finished(self) -> tuple[Skeleton, Seams]:
-        """The skeleton that was brought together: merged, tied up, without stubs; and how."""
-        values = np.concatenate(self._values)
-        same = np.arange(len(values))
-        one, other = np.array(self._merged, np.int64).reshape(-1, 2).T
-        same[one] = other
-        values[other] = (values[other] + values[one]) / 2
-        alive = same == np.arange(len(values))
-        touching = same[np.array(self._touching, np.int64).reshape(-1, 2)]
-        edges = simple_edges(same[np.concatenate(self._edges)])
-        connected = DisjointSet(range(len(alive)))  # cut ends are tied to curves beside them, if that closes no loop
-        pairs = component_labels(len(alive), edges)[touching].tolist()
-        tied = np.array([connected.merge(*pair) for pair in pairs], bool)
+    def skeleton(self) -> tuple[Skeleton, Seams]:
+        """The skeleton of all strands, merged, tied and without stubs; and how its seams are."""
+        values, representative = self._merged_values()
+        edges = simple_edges(representative[np.concatenate(self._edges)])
+        touching = representative[np.array(self._touching, np.int64).reshape(-1, 2)]
+        tied = _closing_no_loop(touching, component_labels(len(values), edges))
         edges, loose = simple_edges(np.concatenate([edges, touching[tied]])), touching[~tied, 0]
         ends = np.concatenate([np.array(list(self._open), np.int64), loose])
-        ends = ends[np.bincount(edges.ravel(), minlength=len(values))[ends] < 2]  # where curves fork, some go on
+        ends = ends[np.bincount(edges.ravel(), minlength=len(values))[ends] < 2]  # at a fork the curve goes on
         stubs, ends = _stubs(values, edges, ends)
-        alive[stubs] = False
-        edges = edges[alive[edges].all(axis=1)]
-        met = np.concatenate(self.met)
-        if len(met):  # where an end of the object is beside a cut end, another tile saw it: there is nothing to meet
-            distance, nearest = cKDTree(met[:, :3]).query(values[ends, :3])
-            ends = ends[distance > values[ends, SCALE] + met[nearest, SCALE]]
-        seams = Seams(len(other) + len(touching) - len(loose), len(ends), self.thickest)
-        number, kept, none = np.cumsum(alive) - 1, values[alive], np.empty((0, 3))
-        edges = simple_edges(number[edges])
-        known = dict(zip(("radii", "confidence", "half_width", "half_thickness"), kept.T[[3, 4, 6, 7]], strict=True))
-        return Skeleton(kept[:, :3], edges, vertex_of_point=none, points=none, normals=none, **known), seams
+        tips = np.concatenate(self.tips)
+        if len(tips):
+            distance, nearest = cKDTree(tips[:, :3]).query(values[ends, :3])
+            ends = ends[distance > values[ends, SCALE] + tips[nearest, SCALE]]
+        seams = Seams(len(self._merged) + int(tied.sum()), len(ends), self.thickest)
+        kept = representative == np.arange(len(values))
+        kept[stubs] = False
+        number, none = np.cumsum(kept) - 1, np.empty((0, 3))
+        edges, values = simple_edges(number[edges[kept[edges].all(axis=1)]]), values[kept]
+        names = ("radii", "confidence", "half_width", "half_thickness")
+        sections = dict(zip(names, values.T[[3, 4, 6, 7]], strict=True))
+        return Skeleton(values[:, :3], edges, vertex_of_point=none, points=none, normals=none, **sections), seams
+
+    def _merged_values(self) -> tuple[np.ndarray, np.ndarray]:
+        """The values, of two merged ends their mean, and the representative of every vertex."""
+        values = np.concatenate(self._values)
+        representative = np.arange(len(values))
+        merged, target = np.array(self._merged, np.int64).reshape(-1, 2).T
+        representative[merged] = target
+        values[target] = (values[target] + values[merged]) / 2
+        return values, representative
+
+
+def _closing_no_loop(pairs: np.ndarray, component: np.ndarray) -> np.ndarray:
+    """Which pairs of vertices, (k, 2) int array, join two components when they are tied in their order."""
+    connected = DisjointSet(range(len(component)))
+    return np.array([connected.merge(*pair) for pair in component[pairs].tolist()], bool)
 
 
 def _stubs(values: np.ndarray, edges: np.ndarray, ends: np.ndarray) -> tuple[list[int], np.ndarray]:

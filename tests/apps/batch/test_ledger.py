@@ -10,7 +10,6 @@ import pytest
 
 from glsk_o3d import BatchError
 from glsk_o3d.apps.batch.ledger import Ledger, file_hash, locked
-from glsk_o3d.errors import FileFormatError
 
 
 def row(name, **values):
@@ -77,10 +76,3 @@ def test_the_lock_dies_with_its_owner(tmp_path):
     owner.communicate()
     with locked(tmp_path):
         pass
-
-
-@pytest.mark.parametrize("name", ["ledger.jsonl", ".ledger.lock"])
-def test_a_pipe_in_its_place_is_refused_and_not_waited_for(tmp_path, name):
-    os.mkfifo(tmp_path / name)
-    with pytest.raises(FileFormatError, match=f"{name}: is a pipe or a device"), locked(tmp_path):
-        Ledger(tmp_path)

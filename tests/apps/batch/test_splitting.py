@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from glsk_o3d import FileFormatError, InvalidCloudError, InvalidParameterError
+from glsk_o3d import FileFormatError, InvalidCloudError
 from glsk_o3d.apps.batch import tiles as module
 from glsk_o3d.apps.batch.ledger import file_hash
-from glsk_o3d.apps.batch.tiles import Cut, Grid, add_to_parts, checked_sizes, divide, known_split, tile_name, tile_of
+from glsk_o3d.apps.batch.tiles import Cut, Grid, add_to_parts, divide, known_split, tile_name, tile_of
 from glsk_o3d.io import streaming
 from glsk_o3d.io.scan import Scan
 from glsk_o3d.io.scans import read_blocks, read_scan
@@ -47,14 +47,6 @@ def test_an_axis_is_cut_only_where_it_is_longer_than_a_tile():
     assert grid.box((1, 0, 0))[0].tolist() == [pytest.approx(10 / 3), -np.inf, -np.inf]
     assert [(axis, round(place, 4)) for axis, place in grid.seams((0, 0, 0))] == [(0, round(10 / 3 - 0.125, 4))]
     assert tile_of(tile_name((3, 0, 12))) == (3, 0, 12)
-
-
-@pytest.mark.parametrize("sizes", [(0, None), ("abc", None), (4, "1"), (4, 1.1)])
-def test_sizes_of_tiles_and_overlaps(sizes):
-    with pytest.raises(InvalidParameterError, match=r"^(tiles|overlap .at most a quarter of tiles.) = .*must be "):
-        checked_sizes(*sizes)
-    assert checked_sizes(4, None) == (4, 0.5)  # an eighth
-    assert checked_sizes(np.float32(4), np.int64(1)) == (4.0, 1.0)
 
 
 @pytest.fixture

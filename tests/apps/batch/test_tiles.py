@@ -64,12 +64,6 @@ def test_what_is_done_is_not_done_again(batch, tmp_path, rows):
     assert sorted(rows()) == ["scene", "scene.tiles/0-0-0", "scene.tiles/1-0-0"]  # the smaller tiles are gone
 
 
-def test_no_worker_reads_the_scene(scene, batch, run, tmp_path):
-    batch(on_plan=lambda plan: scene.rename(tmp_path / "aside"))
-    assert {row["status"] for row in run.result.rows.values()} == {"done"}
-    assert run.result.rows["scene"]["components"] == 2
-
-
 def test_a_tile_that_fails_leaves_the_scene_undone_and_is_tried_again(batch, run, rows, tmp_path, monkeypatch):
     import glsk_o3d.apps.batch.tasks as module
 

@@ -101,13 +101,6 @@ def test_areas_of_an_ordinary_cloud_tile_the_surface(shape):
     assert found == pytest.approx(true or solid.parts[0].area, rel=0.06)
 
 
-def test_points_of_a_grid_keep_their_areas():
-    around, along = np.meshgrid(np.linspace(0, 2 * np.pi, 38, endpoint=False), np.linspace(0, 2, 60))
-    points = np.column_stack([0.2 * np.cos(around.ravel()), 0.2 * np.sin(around.ravel()), along.ravel()])
-    found = cross_check(points)
-    assert (found.verdict, found.rows.eigenvalue_ratio) == ("agrees", pytest.approx(1, abs=0.06))
-
-
 def test_a_constant_is_mapped_to_nothing(even_ball):
     points, faces = even_ball(300)
     for operator in (of_rings(points)[0], of_mesh(points, faces)):
@@ -149,19 +142,6 @@ def test_flat_faces_have_no_curvature_to_compare():
     from_edge = np.sort(0.5 - np.abs(check.points - 0.5), axis=1)[:, 1]
     assert (check.angle[from_edge > 0.15] == 0).mean() > 0.95
     assert check.rows.angle["median"] < 10  # of the edges
-
-
-def test_a_plane_and_nothing_else():
-    flat = np.zeros((900, 3))
-    flat[:, :2] = np.random.default_rng(0).uniform(0, 1, (900, 2))
-    state = RingBuilder(k=24)(flat)
-    place, up = state.positions, np.tile([0, 0, 1.0], (900, 1))
-    solid = Solid(place, Delaunay(place[:, :2]).simplices.astype(np.int64), "given")
-    ours = ring_operator(place, state.rings)
-    angle, found = compare_operators(ours, state.rings, up, mesh_operator(solid), solid)
-    inner = np.abs(flat[state.map.point_of_survivor, :2] - 0.5).max(axis=1) < 0.2
-    assert (angle[inner] == 0).all()
-    assert found.flat == (angle == 0).sum()
 
 
 def test_points_far_from_the_mesh_are_not_compared():

@@ -67,11 +67,6 @@ def test_its_vertices_are_its_own():
     assert pivoted.made_by == "ball_pivoting"
 
 
-def test_the_same_twice():
-    points = torus(600, noise=0.01).points
-    np.testing.assert_array_equal(solid_of(points).vertices, solid_of(points).vertices)
-
-
 # --------------------------------------------------------------------------------------------------- those of the user
 
 
@@ -81,12 +76,6 @@ def test_long_edges_are_halved_and_the_surface_stays():
     a, b, c = solid.vertices[solid.faces].transpose(1, 0, 2)
     assert max(np.linalg.norm(p - q, axis=1).max() for p, q in ((a, b), (b, c), (c, a))) <= 0.3
     assert (solid.parts[0].area, solid.parts[0].volume) == (pytest.approx(18), pytest.approx(4))
-
-
-def test_what_would_take_too_many_is_not_taken():
-    box = triangles(o3d.geometry.TriangleMesh.create_box(1, 1, 4))
-    assert given(SurfaceMesh(*box), UNIT, 0.001) is None
-    assert given(surface_mesh(np.eye(3)), UNIT, 0.1) is None  # a cloud
 
 
 def test_two_tetrahedra_that_share_an_edge_or_a_corner_are_two_parts():
@@ -128,8 +117,3 @@ def test_a_much_finer_mesh_is_simplified():
     solid = given(SurfaceMesh(*ring), UNIT, 0.03)
     assert len(solid.faces) < 30_000
     assert (solid.genus, solid.is_watertight) == (1, True)
-
-
-def test_too_few_points():
-    with pytest.raises(InvalidCloudError, match="10 points are too few"):
-        solid_of(tube(10).points)

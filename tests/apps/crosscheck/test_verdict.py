@@ -98,10 +98,6 @@ def test_a_mesh_at_fault_may_agree_all_the_same_but_not_one_of_something_else():
     assert judged(mesh=(0.21, 0.0))[0] == "cannot tell"
 
 
-def test_a_folded_ring_is_no_fault_of_the_mesh():
-    assert judged(rows={"folded": 1}, mesh=(0.05, 0.0))[0] == "do not trust"
-
-
 def test_the_more_doubt_the_less_probable():
     found = [judged(skeletons={"doubt": doubt})[1] for doubt in (0, 0.1, 0.5, 1, 2)]
     assert found == sorted(found, reverse=True)

@@ -14,7 +14,6 @@ from glsk_o3d.analysis import segment
 from glsk_o3d.apps.meshlab.layers import Layer
 from glsk_o3d.apps.meshlab.script import read_script
 from glsk_o3d.apps.meshlab.steps import read_steps
-from glsk_o3d.apps.meshlab.verbs import verbs
 from glsk_o3d.errors import GlskError, InvalidCloudError, InvalidParameterError, MissingPackageError, ScriptError
 from glsk_o3d.io.skeletons import read_skeleton
 from glsk_o3d.samples import sample_object
@@ -242,16 +241,6 @@ def test_scalars_of_a_skeleton_are_its_radii_and_moved_vertices_its_own(meshes, 
 
 
 # ---- what there is
-
-
-def test_listings_have_both_kinds(capfd, meshes):
-    assert {"meshing_remove_duplicate_vertices", *verbs()} <= set(glsk.MeshSet.filter_list())
-    assert {*verbs()} <= set(dir(glsk.MeshSet))
-    meshes.print_filter_parameter_list(WHOLE)
-    assert "\nringbuilder_k : " in capfd.readouterr().out
-    meshes.generate_curve_skeleton_glsk(ringbuilder_k=9)
-    meshes.print_filter_script()
-    assert '<Param type="RichInt" name="ringbuilder_k" value="9"/>' in capfd.readouterr().out
 
 
 def test_a_skeleton_as_a_mesh_of_meshlab(skeleton, tmp_path, monkeypatch):
