@@ -6,6 +6,9 @@ Many scans, a ledger: finished scans are skipped, and one bad file does not stop
 between machines.
 """
 
+import json
+import subprocess
+import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -13,7 +16,6 @@ import matplotlib.pyplot as plt
 import open3d as o3d
 
 import glsk_o3d as glsk
-from glsk_o3d.apps.batch import run_batch
 from glsk_o3d.samples import SAMPLES
 
 # %%
@@ -30,21 +32,29 @@ for name in ("sauropod", "tube", "torus", "helix", "y_junction", "two_rings"):
 (scans / "broken.ply").write_text("this is no cloud")
 
 # %%
-# Two shards, as on two machines: each takes every second scan, and writes into a folder of its own. In a shell that is
-# ``glsk batch scans -o results/1 --shard 1/2``. A script needs ``if __name__ == "__main__":`` above ``run_batch``,
-# because every worker process imports it.
+# Two shards, as on two machines: each takes every second scan, and writes into a folder of its own. In Python,
+# ``run_batch(scans, results / "1", shard=(1, 2), formats=["json"])`` does the same, below
+# ``if __name__ == "__main__":``, because every worker process imports the script.
 
-shards = [
-    run_batch(scans, results / str(i), workers=1, shard=(i, 2), formats=["json"]) for i in (1, 2)
-]
-again = run_batch(scans, results / "1", workers=1, shard=(1, 2), formats=["json"])
-for run in (*shards, again):
-    print(f"done {run.done}, skipped {run.skipped}, failed {run.failed}")
+
+def glsk_batch(shard: int) -> dict:
+    """What ``glsk batch scans -o results/1 --shard 1/2`` prints as JSON."""
+    options = ["--shard", f"{shard}/2", "--format", "json", "--workers", "1", "--json"]
+    words = ["batch", scans, "-o", results / str(shard), *options]
+    run = subprocess.run([sys.executable, "-m", "glsk_o3d", *words], capture_output=True)
+    return json.loads(run.stdout)
+
+
+for shard in (1, 2, 1):
+    done = glsk_batch(shard)
+    print(f"shard {shard}: {done['done']} done, {done['skipped']} skipped, {done['failed']} failed")
+
 
 # %%
 # The ledgers together have a row for each scan, also for one that failed.
 
-rows = {name: row for run in shards for name, row in run.rows.items()}
+lines = [line for path in results.glob("*/ledger.jsonl") for line in path.read_text().splitlines()]
+rows = {row["name"]: row for row in map(json.loads, lines)}
 for name, row in sorted(rows.items()):
     facts = (
         row["error"]

@@ -13,8 +13,8 @@ CHOICE = ("--families", "tubes,trees", "--seeds", "100:102", "--variants", "clea
 @pytest.fixture
 def bench(invoke, rods):
     """The name of a folder with a benchmark."""
-    made = json.loads(invoke("benchmark", "make", "bench", *CHOICE, "--json").stdout)
-    assert (made["clouds"], made["scored"], made["whole"]) == (8, 7, False)
+    created = json.loads(invoke("benchmark", "make", "bench", *CHOICE, "--json").stdout)
+    assert (created["clouds"], created["scored"], created["whole"]) == (8, 7, False)
     return "bench"
 
 

@@ -11,7 +11,7 @@ from glsk_o3d.apps.crosscheck import cross_check
 from glsk_o3d.samples import torus
 
 
-def test_what_it_says_and_writes(invoke, scans, tmp_path):
+def test_output_and_files(invoke, scans, tmp_path):
     check = cross_check(torus(1000).points)
     scan = tmp_path / os.fsdecode(b"bad\xffname.ply")
     scan.write_bytes((scans / "ring.ply").read_bytes())

@@ -32,9 +32,9 @@ def test_edits_one_after_the_other(invoke, file, tmp_path):
     assert counts.startswith("vertices 17 -> 6, edges 16 -> 5, components 2 -> 1, loops 1 -> 0, ")
     assert (first, second) == ("wrote new.swc", "wrote new.json")
     new = read_skeleton(tmp_path / "new.json")
-    told = json.loads(invoke("edit", file, "-o", "again.json", *words, "--json").stdout)
-    assert [told[when]["vertices"] for when in ("before", "after")] == [17, 6]
-    assert told["files"] == ["again.json"]
+    facts = json.loads(invoke("edit", file, "-o", "again.json", *words, "--json").stdout)
+    assert [facts[when]["vertices"] for when in ("before", "after")] == [17, 6]
+    assert facts["files"] == ["again.json"]
     assert (new.n_components, new.n_loops, new.vertices[0, 0]) == (1, 0, new.vertices[:, 0].min())
     assert read_skeleton(tmp_path / "new.swc").length == pytest.approx(new.length)
     assert invoke("edit", file, "-o", "same.ply").stdout == "all counts are as before\nwrote same.ply\n"
@@ -76,7 +76,7 @@ def line(tmp_path):
 @pytest.mark.parametrize(("word", "x"), [("x", -1), ("thickest", 2), ("1", 0), ("-0.9,0.1,0", -1)])
 def test_a_root_in_all_words(invoke, line, tmp_path, word, x):
     names = [f"t.{name}" for name in ("swc", "urdf", "glb")]
-    outputs = [each for name in (*names, "e.json") for each in ("-o", name)]
+    outputs = [item for name in (*names, "e.json") for item in ("-o", name)]
     assert invoke("edit", line, *outputs, "--root", word).stderr == ""
     for name in names:
         save_skeleton(read_skeleton(line), tmp_path / f"expected-{name}", root=[x, 0, 0])

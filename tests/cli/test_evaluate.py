@@ -42,9 +42,9 @@ def test_without_a_truth(invoke, scans, ring, moved):
 
 def test_with_a_truth(invoke, scans, ring, moved):
     words = ("evaluate", "s.json", scans / "ring.ply", "--truth", "truth.npz")
-    told = json.loads(invoke(*words, "--json").stdout)
-    assert told["comparison"] == asdict(compare(moved, ring))
-    assert told["comparison"]["error"] == pytest.approx(0.5)
+    reported = json.loads(invoke(*words, "--json").stdout)
+    assert reported["comparison"] == asdict(compare(moved, ring))
+    assert reported["comparison"]["error"] == pytest.approx(0.5)
     rows = dict(line.split(maxsplit=1) for line in invoke(*words).stdout.splitlines() if " " in line)
     assert (float(rows["error"]), rows["perfect"]) == (pytest.approx(0.5), "yes")
     assert "ends" not in rows  # a ring has none

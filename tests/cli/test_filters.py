@@ -19,19 +19,19 @@ def test_every_parameter_and_every_pipeline_is_listed(invoke, monkeypatch):
     text = invoke("filters").stdout
     assert max(map(len, text.splitlines())) <= 80
     text, facts = " ".join(text.split()), json.loads(invoke("filters", "--json").stdout)
-    assert [each["name"] for each in facts["filters"]] == list(catalogue())
-    for each in facts["filters"]:
-        cls = catalogue()[each["name"]]
+    assert [item["name"] for item in facts["filters"]] == list(catalogue())
+    for item in facts["filters"]:
+        cls = catalogue()[item["name"]]
         alone = " ".join(invoke("filters", cls.__name__).stdout.split())
-        assert each["kind"] == ("filter" if issubclass(cls, Filter) else "stopping rule")
-        for parameter, field in zip(each["parameters"], dataclasses.fields(cls), strict=True):
+        assert item["kind"] == ("filter" if issubclass(cls, Filter) else "stopping rule")
+        for parameter, field in zip(item["parameters"], dataclasses.fields(cls), strict=True):
             plain = repr(field.default) if dataclasses.is_dataclass(field.default) else field.default
             assert (parameter["name"], parameter["default"]) == (field.name, plain)
             assert all(parameter[key] == value for key, value in field.metadata.items() if key != "choices")
             for words in (f"{field.name} {field.metadata['doc']}", f"default {'none' if plain is None else plain}"):
                 assert words in text
                 assert words in alone
-    expressions = {each["name"]: each["expression"] for each in facts["pipelines"]}
+    expressions = {item["name"]: item["expression"] for item in facts["pipelines"]}
     assert expressions == {name: repr(make()) for name, make in PIPELINES.items()}
     assert all(expression in text for expression in expressions.values())
 
@@ -40,7 +40,7 @@ def test_what_a_plugin_prints_is_no_result(install, capfd):
     code = "print('hello')\nfrom glsk_o3d import pipelines\nmake = pipelines.default\n"
     install("glsk-loud", "1.0", code, "[glsk_o3d.pipelines]\nloud = glsk_loud:make\n")
     result = CliRunner().invoke(main.app, ["filters", "--json"])
-    assert "loud" in [made["name"] for made in json.loads(result.stdout)["pipelines"]]
+    assert "loud" in [created["name"] for created in json.loads(result.stdout)["pipelines"]]
     assert "hello" in result.stderr
 
 
@@ -53,8 +53,8 @@ def glsk(monkeypatch):
 
     def run(*words, entries=None):
         if entries is not None:
-            found = [EntryPoint(name, value, main.COMMAND_GROUP) for name, value in entries.items()]
-            monkeypatch.setattr(main, "entry_points", lambda group, problems: found)
+            actual = [EntryPoint(name, value, main.COMMAND_GROUP) for name, value in entries.items()]
+            monkeypatch.setattr(main, "entry_points", lambda group, problems: actual)
         app = typer.Typer()
         app.command("own")(lambda: None)
         main.add_plugged(app)

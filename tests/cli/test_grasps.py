@@ -20,23 +20,23 @@ def rod(tmp_path):
 
 
 def test_lines_files_and_json_agree(invoke, tmp_path, rod):
-    found = grasp_candidates(read_skeleton(tmp_path / rod), 0.4, plane=(0, 0, 1, 0.25))
+    actual = grasp_candidates(read_skeleton(tmp_path / rod), 0.4, plane=(0, 0, 1, 0.25))
     words = ("grasps", rod, "--opening", 0.4, "--plane", "0,0,1,0.25", "-n", 5)
     result = invoke(*words, "-o", "g.json")
     assert (result.exit_code, result.stderr) == (0, "")
     lines = result.stdout.splitlines()
-    assert lines[0].startswith(f"{len(found)} grasps at 9 places, ")
+    assert lines[0].startswith(f"{len(actual)} grasps at 9 places, ")
     assert lines[1] == f"left out: {5 * 9} ways in behind the plane"
     rows = [line for line in lines if line.endswith(" 0") and "left out" not in line]
     assert len(rows) == len({row.split()[0] for row in rows}) == 5  # places
-    told, printed = json.loads((tmp_path / "g.json").read_text()), json.loads(invoke(*words, "--json").stdout)
-    assert printed == {"skeleton": rod, "found": len(found), **told, "files": []}
-    assert told["gripper"]["finger"] == list(Gripper(0.4).finger)
-    np.testing.assert_allclose([row["pose"] for row in told["grasps"]], found[:5].poses)
+    reported, printed = json.loads((tmp_path / "g.json").read_text()), json.loads(invoke(*words, "--json").stdout)
+    assert printed == {"skeleton": rod, "found": len(actual), **reported, "files": []}
+    assert reported["gripper"]["finger"] == list(Gripper(0.4).finger)
+    np.testing.assert_allclose([row["pose"] for row in reported["grasps"]], actual[:5].poses)
     invoke(*words, "-o", "g.csv")
     with (tmp_path / "g.csv").open(newline="") as stream:
         table = list(csv.DictReader(stream))
-    np.testing.assert_allclose([float(row["opening"]) for row in table], found[:5].opening)
+    np.testing.assert_allclose([float(row["opening"]) for row in table], actual[:5].opening)
     assert invoke(*words, "-q").stdout == ""
 
 

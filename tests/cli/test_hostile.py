@@ -1,43 +1,16 @@
 """What a hostile file, name or number must not do: reach the terminal, end in a traceback, or spoil JSON."""
 
-import json
-import logging
-
 import numpy as np
 import pytest
-import typer
 
-from glsk_o3d.cli.console import echo, print_json, print_rows, print_table, say, visible
-from glsk_o3d.cli.reporting import reporting
-from glsk_o3d.errors import FileFormatError
 from glsk_o3d.samples import torus
 
 NASTY = "a\x1b[2J\x1b]0;title\x07\x9b31m\rbc\x7f"
-HARMLESS = r"a\x1b[2J\x1b]0;title\x07\x9b31m\rbc\x7f"
 
 
 def commands(text):
     """Characters that a terminal would obey."""
     return [sign for sign in text if sign in NASTY and not sign.isprintable()]
-
-
-def test_whatever_prints(capfd):
-    assert visible(NASTY) == visible(HARMLESS) == HARMLESS
-    assert visible("Größe 3 µm\n\tü") == "Größe 3 µm\n\tü"
-    echo(NASTY)
-    say("error", NASTY)
-    print_table([[NASTY]], [NASTY])
-    print_rows({NASTY: NASTY}, title=NASTY)
-    print_json({NASTY: [NASTY]})
-    with reporting():
-        logging.getLogger("glsk_o3d").warning("%s", NASTY)
-    with pytest.raises(typer.Exit), reporting(verbose=True):
-        raise FileFormatError(NASTY)
-    out, err = capfd.readouterr()
-    assert commands(out + err) == []
-    assert out.count(r"\x1b[2J") == 6
-    assert err.count(r"\x1b[2J") >= 4
-    assert json.loads(out[out.index("{") :]) == {NASTY: [NASTY]}
 
 
 @pytest.mark.parametrize(

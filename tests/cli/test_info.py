@@ -13,7 +13,7 @@ from glsk_o3d.io.scans import read_blocks
 
 
 @pytest.fixture
-def told(invoke):
+def reported(invoke):
     """What `glsk info --json` says, and that the table says as much."""
 
     def info(path):
@@ -29,20 +29,20 @@ def told(invoke):
     return info
 
 
-def test_numbers_of_a_cloud(told, tmp_path, write_scan):
+def test_numbers_of_a_cloud(reported, tmp_path, write_scan):
     rows = [[x, 2 * y, 0] for x in range(3) for y in range(2)]
     write_scan(tmp_path / "grid.ply", [*rows, rows[0], [np.nan, 0, 0]])
-    facts = told("grid.ply")
+    facts = reported("grid.ply")
     assert (facts["kind"], facts["points"], facts["not_finite"]) == ("cloud", 8, 1)
     assert (facts["duplicates"], facts["median_spacing"]) == (1, 1)
     assert (facts["lowest"], facts["highest"]) == ([0, 0, 0], [2, 2, 0])
     assert facts["diagonal"] == pytest.approx(np.sqrt(8))
     assert (facts["colours"], facts["normals"]) == (False, False)
     (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    facts = told("m.obj")
+    facts = reported("m.obj")
     assert (facts["kind"], facts["points"], facts["triangles"]) == ("cloud", 3, 1)
     write_scan(tmp_path / "bad.ply", np.full((3, 3), np.nan))
-    facts = told("bad.ply")
+    facts = reported("bad.ply")
     assert (facts["not_finite"], facts["diagonal"], facts["median_spacing"]) == (3, None, None)
 
 
@@ -55,28 +55,32 @@ def skeleton(invoke, scans, tmp_path):
     return {name: read_skeleton(tmp_path / name) for name in names}
 
 
-def test_skeletons_of_every_format_and_the_report_of_the_run(told, skeleton, invoke, tmp_path):
-    for name, it in skeleton.items():
-        facts = told(name)
+def test_skeletons_of_every_format_and_the_report_of_the_run(reported, skeleton, invoke, tmp_path):
+    for name, item in skeleton.items():
+        facts = reported(name)
         assert facts["kind"] == "skeleton"
-        assert (facts["vertices"], facts["edges"], facts["loops"]) == (len(it.vertices), len(it.edges), it.n_loops)
-        assert (facts["leaves"], facts["junctions"]) == (len(it.leaves), len(it.junctions))
-        assert facts["length"] == pytest.approx(it.length)
-        assert (facts["radii"] is None) == bool(np.isnan(it.radii).all())
-    facts, report = told("s.npz"), skeleton["s.npz"].report
+        assert (facts["vertices"], facts["edges"], facts["loops"]) == (
+            len(item.vertices),
+            len(item.edges),
+            item.n_loops,
+        )
+        assert (facts["leaves"], facts["junctions"]) == (len(item.leaves), len(item.junctions))
+        assert facts["length"] == pytest.approx(item.length)
+        assert (facts["radii"] is None) == bool(np.isnan(item.radii).all())
+    facts, report = reported("s.npz"), skeleton["s.npz"].report
     assert facts["stop_reason"] == report.stop_reason
     assert facts["stages"] == list(report.stages)
-    assert [each["n_points"] for each in facts["iterations"]] == [each.n_points for each in report.iterations]
-    assert all(f"{each.explained:.4f}" in invoke("info", "s.npz").stdout for each in report.iterations)
+    assert [item["n_points"] for item in facts["iterations"]] == [item.n_points for item in report.iterations]
+    assert all(f"{item.explained:.4f}" in invoke("info", "s.npz").stdout for item in report.iterations)
     call = Decision("gap", (1.0, 2.0, 3.0), 0.45, changed=False)
     save_skeleton(replace(skeleton["s.json"], report=replace(report, decisions=(call,))), tmp_path / "close.json")
-    assert told("close.json")["uncertain"] == [str(call)]
+    assert reported("close.json")["uncertain"] == [str(call)]
 
 
-def test_attributes_and_conditions_on_them(invoke, told, refused, tmp_path):
+def test_attributes_and_conditions_on_them(invoke, reported, refused, tmp_path):
     rows = [f"{i},{i * i},0,{i % 3},{i / 7}" for i in range(30)]
     (tmp_path / "c.csv").write_text("\n".join(["x,y,z,Tree ID,intensity", *rows]))
-    facts = told("c.csv")["attributes"]
+    facts = reported("c.csv")["attributes"]
     assert facts["Tree_ID"] == {"lowest": 0, "highest": 2, "counts": {"0": 10, "1": 10, "2": 10}}
     assert facts["intensity"] == {"lowest": 0.0, "highest": 29 / 7}
     text = invoke("info", "c.csv").stdout
@@ -87,7 +91,7 @@ def test_attributes_and_conditions_on_them(invoke, told, refused, tmp_path):
     assert refused(1, "info", "c.csv", "--where", "x > 99") == "there is no point with x > 99"
 
 
-def test_a_large_cloud_is_told_block_by_block(told, tmp_path, monkeypatch):
+def test_a_large_cloud_is_read_in_blocks(reported, tmp_path, monkeypatch):
     random = np.random.default_rng(2)
     places = random.normal(size=(500, 3))
     places[77] = np.nan
@@ -95,11 +99,11 @@ def test_a_large_cloud_is_told_block_by_block(told, tmp_path, monkeypatch):
     cloud.point.label = o3d.core.Tensor(random.integers(0, 9, (500, 1)).astype(np.int32))
     cloud.point.time = o3d.core.Tensor(random.random((500, 1)))
     o3d.t.io.write_point_cloud(str(tmp_path / "c.ply"), cloud)
-    whole = told(tmp_path / "c.ply")
+    whole = reported(tmp_path / "c.ply")
     monkeypatch.setattr(streaming, "LARGE_CLOUD", 499)
     monkeypatch.setitem(read_blocks.__kwdefaults__, "rows", 60)
-    found = told(tmp_path / "c.ply")
-    assert found == {name: whole[name] for name in whole if name not in ("duplicates", "median_spacing", "triangles")}
+    actual = reported(tmp_path / "c.ply")
+    assert actual == {name: whole[name] for name in whole if name not in ("duplicates", "median_spacing", "triangles")}
 
 
 # -------------------------------------------------------------------------------------------------------------- to look

@@ -13,8 +13,8 @@ from glsk_o3d.pipelines import default
 
 
 def find(pipeline, name):
-    (found,) = [part for part in parts(pipeline) if type(part).__name__ == name]
-    return found
+    (actual,) = [part for part in parts(pipeline) if type(part).__name__ == name]
+    return actual
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,7 @@ def strictly(types, kind, /, **fields):
         elif field in fields and shape is Nodetype.NAME:
             assert isinstance(fields[field], types.types[of]), (kind, field)
         elif field in fields and of[0][0] is Nodetype.NAME:
-            assert all(isinstance(each, types.types[of[0][1]]) for each in fields[field]), (kind, field)
+            assert all(isinstance(value, types.types[of[0][1]]) for value in fields[field]), (kind, field)
         elif field in fields:
             assert isinstance(fields[field], array), (kind, field)
     return maker(types)(kind, **fields)
@@ -89,23 +89,25 @@ def ros(types, monkeypatch):
     """Modules of ROS that are none; gives a function that makes our node with parameters."""
 
     def module(name, **names):
-        made = ModuleType(name)
-        vars(made).update(names)
-        monkeypatch.setitem(sys.modules, name, made)
-        return made
+        created = ModuleType(name)
+        vars(created).update(names)
+        monkeypatch.setitem(sys.modules, name, created)
+        return created
 
     def classes(package, *names):
         module(package)
         module(f"{package}.msg", **{name: types.types[f"{package}/msg/{name}"] for name in names})
 
-    told = []
+    calls = []
     classes("geometry_msgs", "PoseArray")
     classes("sensor_msgs", "PointCloud2")
     classes("visualization_msgs", "MarkerArray")
     module("rosidl_runtime_py")
     module("rosidl_runtime_py.utilities", get_message=lambda name: partial(strictly, types, name))
-    rclpy = module("rclpy", told=told, init=lambda args: told.append("init"), spin=lambda node: told.append(node.name))
-    rclpy.try_shutdown = lambda: told.append("shutdown")
+    rclpy = module(
+        "rclpy", calls=calls, init=lambda args: calls.append("init"), spin=lambda node: calls.append(node.name)
+    )
+    rclpy.try_shutdown = lambda: calls.append("shutdown")
     module("rclpy.executors", ExternalShutdownException=type("ExternalShutdownException", (Exception,), {}))
     module("rclpy.node", Node=FakeNode)
     module(

@@ -123,10 +123,10 @@ def test_wrong_parameters_end_the_node_at_once(ros, parameters, message):
 
     with pytest.raises(SystemExit, match=message):
         main()
-    assert ros.rclpy.told == ["init", "shutdown"]
+    assert ros.rclpy.calls == ["init", "shutdown"]
     ros.node()
     main()
-    assert ros.rclpy.told[2:] == ["init", "skeletonize_node", "shutdown"]
+    assert ros.rclpy.calls[2:] == ["init", "skeletonize_node", "shutdown"]
 
 
 # ---------------------------------------------------------------------------------------------------------------- bags
@@ -167,14 +167,14 @@ def test_the_script_does_what_the_node_does(recorded, types, tmp_path, expected,
             bag.main(words.split())
     assert not (tmp_path / "no").exists()
     bag.main([str(recorded), str(tmp_path / "out"), "--topic", "/points"])
-    said = capsys.readouterr()
-    assert said.out == f"2 clouds skeletonised: {tmp_path / 'out'}\n"
-    assert said.err == f"cloud at {2 * SECOND} left out: the cloud has 3 finite points, and min_points is 100\n"
-    found = messages(tmp_path / "out", types)
-    assert [(time, topic) for time, topic, _ in found] == [
+    output = capsys.readouterr()
+    assert output.out == f"2 clouds skeletonised: {tmp_path / 'out'}\n"
+    assert output.err == f"cloud at {2 * SECOND} left out: the cloud has 3 finite points, and min_points is 100\n"
+    actual = messages(tmp_path / "out", types)
+    assert [(time, topic) for time, topic, _ in actual] == [
         (time * SECOND, f"/skeletonize_node/{name}") for time in (1, 3) for name in ("markers", "poses")
     ]
-    for (_, _, markers), (_, _, poses) in zip(found[::2], found[1::2], strict=True):
+    for (_, _, markers), (_, _, poses) in zip(actual[::2], actual[1::2], strict=True):
         np.testing.assert_array_equal(line_ends(markers, rows), expected.vertices[expected.edges].reshape(-1, 3))
         np.testing.assert_array_equal(rows(pose.position for pose in poses.poses), expected.vertices)
         assert (poses.header.frame_id, poses.header.stamp.sec) == (header.frame_id, header.stamp.sec)

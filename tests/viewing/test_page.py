@@ -82,7 +82,7 @@ def test_no_text_of_a_file_becomes_part_of_the_page(tmp_path, tree, ending):
 # ---------------------------------------------------------------------------------------------------------- sections
 
 
-def test_solves_are_rows_and_warnings_are_listed_once_each():
+def test_solves_are_rows_and_warnings_are_listed_once():
     names = [field.name for field in dataclasses.fields(IterationRecord)]
     records = tuple(IterationRecord(**dict.fromkeys(names, 0) | {"iteration": i, "n_points": 900}) for i in (1, 2))
     text = page.contraction(Report(iterations=records, stop_reason="<b>"))

@@ -29,15 +29,7 @@ def test_without_a_display(tree, monkeypatch, display):
         show(tree)
 
 
-@needs_x11
-def test_a_window_that_cannot_be_opened(tree, monkeypatch):
-    monkeypatch.setattr("glsk_o3d.viewing.window.has_display", lambda: True)
-    monkeypatch.setattr("open3d.visualization.VisualizerWithKeyCallback.create_window", lambda *_: False)
-    with pytest.raises(DisplayError, match="Open3D cannot open"):
-        show(tree)
-
-
-def test_what_it_shows(run, forest, bare):
+def test_layers_of_the_window(run, forest, bare):
     skeleton = run
     shapes = layers(skeleton)
     (cloud,), (lines, thin), (tubes,) = (shapes[name] for name in ("cloud", "skeleton", "radius tubes"))

@@ -10,7 +10,7 @@ from glsk_o3d.apps.batch.inputs import find_inputs
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path, monkeypatch):
+def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -25,9 +25,9 @@ def touch(*names):
 
 
 def names(*inputs, out="out", **options):
-    found, _ = find_inputs(inputs, out, **options)
-    assert all(path.is_absolute() for path in found)
-    return list(found.values())
+    actual, _ = find_inputs(inputs, out, **options)
+    assert all(path.is_absolute() for path in actual)
+    return list(actual.values())
 
 
 def left_out(*inputs, out="out"):
@@ -47,16 +47,16 @@ def test_a_folder_and_what_is_left_out_with_the_reason():
     assert names("in") == ["a", "b", "scan"]
 
 
-def test_a_list(here):
+def test_a_list(folder):
     touch("in/a.ply", "in/sub/b.ply", "lists/b.ply")
     Path("list.txt").write_bytes(b"\xef\xbb\xbf# mine\r\nin/a.ply\r\n\r\n  in/sub/b.ply\nin/gone.ply")
     assert names("list.txt") == ["in/a", "in/gone", "in/sub/b"]
     Path("lists/list.txt").write_text("in/a.ply\nlists/b.ply\n")
-    assert names("lists/list.txt") == ["b", (here / "in" / "a").relative_to(here.anchor).as_posix()]
+    assert names("lists/list.txt") == ["b", (folder / "in" / "a").relative_to(folder.anchor).as_posix()]
     Path("scan.txt").write_text("1 2 3\n" * 9)
     assert names("scan.txt") == ["scan"]
     Path("own.txt").write_text(".\n")  # it fails when its turn comes, and needs a name until then
-    assert names("own.txt") == [here.name]
+    assert names("own.txt") == [folder.name]
 
 
 @pytest.mark.parametrize(
@@ -72,9 +72,9 @@ def test_a_text_that_is_no_list(content, message):
         names("list.txt")
 
 
-def test_the_same_file_twice_is_one(here):
+def test_the_same_file_twice_is_one(folder):
     touch("l/d.ply")
-    Path("l/list.txt").write_text(f"l/d.ply\n{here}/l/../l/d.ply\n")
+    Path("l/list.txt").write_text(f"l/d.ply\n{folder}/l/../l/d.ply\n")
     assert names("l/list.txt", "l/d.ply", "l") == ["d"]
 
 

@@ -43,24 +43,24 @@ def rod(start, stop, radius=0.05):
 
 
 def together(*curves):
-    first = np.cumsum([0, *(len(each.vertices) for each in curves)])
+    first = np.cumsum([0, *(len(item.vertices) for item in curves)])
     return curve(
-        np.concatenate([each.vertices for each in curves]),
-        np.concatenate([each.edges + at for each, at in zip(curves, first, strict=False)]),
-        np.concatenate([each.radii for each in curves]),
+        np.concatenate([item.vertices for item in curves]),
+        np.concatenate([item.edges + at for item, at in zip(curves, first, strict=False)]),
+        np.concatenate([item.radii for item in curves]),
     )
 
 
 def seen(axis, grid, stray=0.0, seed=0):
     """What every tile would make of a curve: what lies in it and its overlap, each with an error of its own."""
-    rng, found = np.random.default_rng(seed), {}
+    rng, actual = np.random.default_rng(seed), {}
     for tile in np.ndindex(*grid.counts):
         part = Strands.of(axis).within(*grid.box(tile, grid.overlap))
         if len(part.values):
             moved = part.values[:, :3] + rng.normal(size=3) * stray
             moved += rng.uniform(-0.1, 0.1, moved.shape) * stray
-            found[tile] = replace(curve(moved, part.edges, part.values[:, 3]), confidence=part.values[:, 4])
-    return found
+            actual[tile] = replace(curve(moved, part.edges, part.values[:, 3]), confidence=part.values[:, 4])
+    return actual
 
 
 def structure(skeleton):
@@ -95,7 +95,7 @@ def three_tiles(overlap=0.2):
 
 
 @pytest.mark.parametrize("shift", [-0.05, 0.0, 1e-12, 0.02, 0.05, 0.075])
-def test_a_curve_that_runs_along_a_seam_is_there_once(shift):
+def test_a_curve_along_a_seam_is_kept_once(shift):
     grid = Grid((-1, -1, -1), (1, 1, 2), (2, 2, 1), 0.2)
     axis = together(rod([shift, shift, -0.9], [shift, shift, 0.9]), rod([-0.9, 0.5, 0], [0.9, 0.5, 0]))
     for seed in range(3):
@@ -133,7 +133,7 @@ def test_rods_side_by_side_are_not_swapped():
             assert len(set(np.sign(offset[joined.component_of_vertex == piece]))) == 1
 
 
-def test_a_curve_without_errors_comes_out_as_it_was():
+def test_a_curve_without_errors_is_unchanged():
     axis, grid = rod([0.1, 0, 0], [2.9, 0.3, 0]), three_tiles()
     flat = {tile: replace(part, half_width=3 * part.radii) for tile, part in seen(axis, grid).items()}
     joined, seams = join_tiles(flat, grid)
@@ -148,17 +148,17 @@ def test_a_curve_without_errors_comes_out_as_it_was():
 
 def test_the_order_of_tiles_does_not_matter():
     grid = Grid((-1, -1, -1), (1, 1, 2), (2, 2, 1), 0.2)
-    found = seen(AXES["sauropod"], grid, 0.002)
-    one, other = (join_tiles(dict(items), grid)[0] for items in (found.items(), reversed(found.items())))
+    actual = seen(AXES["sauropod"], grid, 0.002)
+    one, other = (join_tiles(dict(items), grid)[0] for items in (actual.items(), reversed(actual.items())))
     for name in ("vertices", "edges", "radii", "confidence"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
 
-def test_what_one_side_lost_is_told_and_the_other_is_kept():
+def test_a_part_that_one_tile_lost_is_reported_and_kept():
     grid = three_tiles()
-    found = seen(rod([0.1, 0, 0], [2.9, 0, 0]), grid)
-    del found[1, 0, 0]
-    joined, seams = join_tiles(found, grid)
+    actual = seen(rod([0.1, 0, 0], [2.9, 0, 0]), grid)
+    del actual[1, 0, 0]
+    joined, seams = join_tiles(actual, grid)
     assert structure(joined) == (2, 0, 4)
     assert (seams.joined, seams.unmatched) == (0, 2)
     (message,) = seams.messages(grid)
@@ -172,27 +172,27 @@ def test_an_end_of_the_object_at_a_seam_is_no_cut():
         assert seams.unmatched == 0
 
 
-def test_parts_that_are_too_thick_are_told_where_they_meet_and_where_they_retreat_from_the_cut():
+def test_parts_too_thick_for_the_overlap_are_reported():
     grid = three_tiles(0.1)
     _, seams = join_tiles(seen(rod([0.1, 0, 0], [2.9, 0, 0], 0.06), grid), grid)
     assert seams.messages(grid) == [
         "at seams there are parts thicker than the overlap of 0.1 allows, radius up to 0.06: give 0.16 or more"
     ]
     grid = three_tiles(0.02)
-    found = {(i, 0, 0): rod([i + 0.1, 0, 0], [i + 0.9, 0, 0], 0.08) for i in range(3)}
-    joined, seams = join_tiles(found, grid)
+    actual = {(i, 0, 0): rod([i + 0.1, 0, 0], [i + 0.9, 0, 0], 0.08) for i in range(3)}
+    joined, seams = join_tiles(actual, grid)
     assert (structure(joined), seams.joined, seams.unmatched) == ((3, 0, 6), 0, 0)
     (message,) = seams.messages(grid)
     assert message.startswith("at seams there are parts thicker than the overlap of 0.02 allows")
-    thin = {tile: replace(each, radii=each.radii / 2) for tile, each in found.items()}
+    thin = {tile: replace(item, radii=item.radii / 2) for tile, item in actual.items()}
     assert join_tiles(thin, grid)[1].messages(grid) == []
 
 
 def test_a_limb_that_one_tile_lost_at_a_trunk_is_tied_to_it():
     grid = Grid((-1, -1, -1), (1, 2, 2), (2, 1, 1), 0.2)
     tree = curve([[0, 0, -0.9], [0, 0, 0], [0, 0, 0.9], [0.9, 0, 0]], [[0, 1], [1, 2], [1, 3]], 0.09)
-    found = {(0, 0, 0): rod([0, 0, -0.9], [0, 0, 0.9], 0.09), (1, 0, 0): refined(tree, 0.02)}
-    joined, seams = join_tiles(found, grid)
+    actual = {(0, 0, 0): rod([0, 0, -0.9], [0, 0, 0.9], 0.09), (1, 0, 0): refined(tree, 0.02)}
+    joined, seams = join_tiles(actual, grid)
     assert structure(joined) == (1, 0, 3)
     assert (seams.joined, seams.unmatched) == (1, 0)
 

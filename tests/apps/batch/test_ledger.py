@@ -22,9 +22,9 @@ def lines(folder):
 
 def test_rows_are_in_the_file_at_once_and_the_last_of_a_name_counts(tmp_path):
     ledger = Ledger(tmp_path)
-    for each in (row("b", status="failed"), row("a"), row("b")):
-        ledger.add(each)
-        assert lines(tmp_path)[-1] == each
+    for item in (row("b", status="failed"), row("a"), row("b")):
+        ledger.add(item)
+        assert lines(tmp_path)[-1] == item
     ledger.rewrite()
     assert lines(tmp_path) == [row("a"), row("b")]
     assert Ledger(tmp_path).rows == ledger.rows

@@ -12,9 +12,7 @@ import glsk_o3d
 from glsk_o3d import Connector, InvalidParameterError, RecipeError, pipelines, read_skeleton, skeletonize
 from glsk_o3d.apps.batch import plan_batch, run_batch
 from glsk_o3d.apps.batch.ledger import file_hash
-from glsk_o3d.io import streaming
 from glsk_o3d.recipes import to_recipe
-from glsk_o3d.samples import torus
 
 # the work is done in this process, where a skeleton's warnings are errors
 pytestmark = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
@@ -162,22 +160,6 @@ def test_bad_files_stop_nothing_and_say_why(run, scans, rows, tmp_path, monkeypa
     monkeypatch.setattr("glsk_o3d.apps.batch.tasks.points_for", lambda *_: 1 / 0)  # a mistake in the code
     run([scans / "b.ply"], force=True)
     assert rows()["b"]["error"] == "ZeroDivisionError: division by zero"
-
-
-@pytest.mark.parametrize("where", [None, "x > -100"])
-def test_a_large_cloud_is_read_in_blocks(run, rows, tmp_path, monkeypatch, where):
-    import open3d as o3d
-
-    points, pipeline = torus(9000).points, pipelines.default().with_options(size=4000, thin_to=2000)
-    path = tmp_path / "scan.ply"
-    o3d.t.io.write_point_cloud(str(path), o3d.t.geometry.PointCloud(o3d.core.Tensor(points)))
-    monkeypatch.setattr(streaming, "LARGE_CLOUD", 8999)
-    run(path, formats=["json"], where=where, pipeline=pipeline)
-    row = rows()["scan"]
-    assert (row["points"], row["loops"]) == (9000, 1)
-    skeleton = read_skeleton(tmp_path / "out" / "scan.json")
-    assert len(skeleton.points) == row["sampled"] < 9000
-    np.testing.assert_allclose(skeleton.vertices, skeletonize(points, pipeline).vertices, rtol=0, atol=1e-9)
 
 
 @pytest.mark.usefixtures("no_run")

@@ -93,16 +93,16 @@ def split(tmp_path):
 
 
 def test_a_file_per_tile_in_two_passes(scene, passes, split, tmp_path):
-    found = split(scene, **TILES, where="x > 333334")
+    actual = split(scene, **TILES, where="x > 333334")
     assert len(passes) == 2  # one for the box
     positions = read_scan(scene, "x > 333334").positions
-    assert (found.grid.counts, found.points, found.dropped) == ((3, 2, 1), len(positions), 0)
-    rows = dict(found.grid.parted(positions))
-    assert {tile_of(label) for label in found.labels} == set(rows)
-    for label in found.labels:
+    assert (actual.grid.counts, actual.points, actual.dropped) == ((3, 2, 1), len(positions), 0)
+    rows = dict(actual.grid.parted(positions))
+    assert {tile_of(label) for label in actual.labels} == set(rows)
+    for label in actual.labels:
         part = read_scan(tmp_path / "parts" / f"{label}.ply").positions
         np.testing.assert_array_equal(part, positions[rows[tile_of(label)]])
-    assert split(scene, **TILES, where="x > 333334") == found
+    assert split(scene, **TILES, where="x > 333334") == actual
     assert len(passes) == 2  # known
     assert len(split(scene, tiles=5.0, overlap=0.25).labels) == 1  # another cut
     assert not (tmp_path / "parts" / "2-1-0.ply").exists()
@@ -149,5 +149,5 @@ def test_points_that_are_not_finite(table, passes, split):
     with pytest.raises(InvalidCloudError, match=r"^3 of 300 points have NaN .* first at index 100: drop them"):
         split(scene, **TILES)
     assert len(passes) == 1
-    found = split(scene, **TILES, drop_invalid=True)
-    assert (found.points, found.dropped) == (300, 3)
+    actual = split(scene, **TILES, drop_invalid=True)
+    assert (actual.points, actual.dropped) == (300, 3)

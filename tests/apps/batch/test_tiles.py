@@ -32,14 +32,14 @@ def batch(scene, run):
 
 def test_one_skeleton_of_a_scene(batch, scene, rows, tmp_path):
     assert batch(formats=["ply", "json"], preview=True) == dict.fromkeys(NAMES, "new")
-    found = rows()
-    assert sorted(found) == sorted(NAMES)
-    whole = found["scene"]
+    actual = rows()
+    assert sorted(actual) == sorted(NAMES)
+    whole = actual["scene"]
     assert (whole["points"], whole["dropped"], whole["unmatched"]) == (4503, 0, 0)
     assert (whole["components"], whole["loops"], whole["leaves"]) == (2, 1, 2)
     assert whole["outputs"] == ["scene.ply", "scene.json", "scene.png"]
     inputs = {str(scene), *(f"{scene} tile {name[-5:]}" for name in NAMES[:-1])}
-    assert {row["input"] for row in found.values()} == inputs
+    assert {row["input"] for row in actual.values()} == inputs
     joined = read_skeleton(tmp_path / "out" / "scene.json")
     assert (len(joined.points), joined.report.n_input) == (0, 4503)
     assert np.isfinite(joined.confidence).any()
@@ -50,8 +50,8 @@ def test_what_is_done_is_not_done_again(batch, tmp_path, rows):
     assert batch() == {}
 
     def written():
-        found = [path for path in (tmp_path / "out").rglob("*") if path.suffix in (".npz", ".ply")]
-        return {path.stem: (path.stat().st_ino, path.stat().st_mtime_ns) for path in found}
+        actual = [path for path in (tmp_path / "out").rglob("*") if path.suffix in (".npz", ".ply")]
+        return {path.stem: (path.stat().st_ino, path.stat().st_mtime_ns) for path in actual}
 
     first = written()
     (tmp_path / "out" / "scene.tiles" / "1-1-0.npz").unlink()
@@ -70,9 +70,9 @@ def test_a_tile_that_fails_leaves_the_scene_undone_and_is_tried_again(batch, run
     real = module._of_tile
     monkeypatch.setattr(module, "_of_tile", lambda task: 1 / 0 if task.name.endswith("1-0-0") else real(task))
     batch()
-    found = rows(strict=False)
+    actual = rows(strict=False)
     assert run.result.failed == 2
-    assert found["scene"]["error"].startswith("1 of 6 tiles failed, scene.tiles/1-0-0 since ZeroDivisionError: ")
+    assert actual["scene"]["error"].startswith("1 of 6 tiles failed, scene.tiles/1-0-0 since ZeroDivisionError: ")
     assert not (tmp_path / "out" / "scene.ply").exists()
     monkeypatch.undo()
     assert batch() == {"scene.tiles/1-0-0": "failed before", "scene": "failed before"}
@@ -89,7 +89,7 @@ def test_a_batch_that_is_killed_leaves_no_worker_goes_on_and_comes_to_the_same(
     workers = psutil.Process(process.pid).children()
     process.kill()
     process.communicate()
-    until(lambda: not any(each.is_running() and each.status() != psutil.STATUS_ZOMBIE for each in workers))
+    until(lambda: not any(item.is_running() and item.status() != psutil.STATUS_ZOMBIE for item in workers))
     done = set(rows(strict=False))
     assert 2 <= len(done) < 7
     assert set(batch()) == set(NAMES) - done

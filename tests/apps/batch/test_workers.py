@@ -34,9 +34,9 @@ def test_a_worker_that_dies_costs_its_own_scan_alone(tmp_path, write, rows, sabo
     for i, order in enumerate((0, 1000, 0)):
         write(tmp_path / "in" / f"{i}.ply", seed=i, order=order)
     result = run_batch(tmp_path / "in", tmp_path / "out", pipeline=saboteur, workers=2)
-    found = rows()
-    assert (result.done, result.failed, len(found)) == (2, 1, 3)
-    assert (found["1"]["status"], found["1"]["error"]) == ("failed", WORKER_DIED)
+    actual = rows()
+    assert (result.done, result.failed, len(actual)) == (2, 1, 3)
+    assert (actual["1"]["status"], actual["1"]["error"]) == ("failed", WORKER_DIED)
     once = tmp_path / "saboteur" / "once"
     once.touch()
     write(tmp_path / "in" / "1.ply", seed=1, order=2000)  # kills its worker the first time
@@ -60,9 +60,9 @@ def test_ctrl_c_leaves_no_worker_and_on_again(saboteur, start, waiting, until, w
     batch = start("in", "-o", "out", "--pipeline", saboteur, "--workers", "1")
     [worker] = map(psutil.Process, waiting(batch))
     os.killpg(batch.pid, signal.SIGINT)
-    said = batch.stderr.read()  # to its end, although the third scan never goes on
-    assert batch.wait() == 130, said
-    assert said.splitlines()[-1] == "glsk: error: interrupted; no file is half-written"
+    answer = batch.stderr.read()  # to its end, although the third scan never goes on
+    assert batch.wait() == 130, answer
+    assert answer.splitlines()[-1] == "glsk: error: interrupted; no file is half-written"
     until(lambda: not worker.is_running() or worker.status() == psutil.STATUS_ZOMBIE)  # nobody has asked after it
     first = rows(strict=False)
     assert sorted(first) == ["0", "1"]

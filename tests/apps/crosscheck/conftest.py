@@ -66,10 +66,10 @@ def bench(limbs):
     )
 
     def judged(**broken):
-        now = SimpleNamespace(**(vars(parts) | broken))
-        _, rows = compare_operators(now.ours, now.rings, points.ring_normals, now.theirs, body)
+        current = SimpleNamespace(**(vars(parts) | broken))
+        _, rows = compare_operators(current.ours, current.rings, points.ring_normals, current.theirs, body)
         skeletons = compare_skeletons(
-            now.skeleton, check.mesh_skeleton, 0.002 * state.frame.diagonal * state.frame.scale
+            current.skeleton, check.mesh_skeleton, 0.002 * state.frame.diagonal * state.frame.scale
         )
         return judge(rows, skeletons, check.solid, check.mesh)
 

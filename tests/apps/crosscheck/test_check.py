@@ -27,22 +27,22 @@ SPIKY = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
 
 @pytest.mark.parametrize("shape", ["tube", "helix", "two_rings", "y_junction", "sauropod"])
 def test_clean_and_dense_shapes_agree(shape):
-    found = cross_check(samples.SAMPLES[shape](4096).points)
-    assert (found.verdict, found.reasons) == ("agrees", ())
-    assert found.probability > 0.9
-    assert found.rows.angle["median"] < 10
-    assert found.rows.ratio["median"] == pytest.approx(1, abs=0.1)
-    assert found.rows.eigenvalue_ratio == pytest.approx(1, abs=0.15)
-    assert found.skeletons.distance_in_radii < 0.1
+    actual = cross_check(samples.SAMPLES[shape](4096).points)
+    assert (actual.verdict, actual.reasons) == ("agrees", ())
+    assert actual.probability > 0.9
+    assert actual.rows.angle["median"] < 10
+    assert actual.rows.ratio["median"] == pytest.approx(1, abs=0.1)
+    assert actual.rows.eigenvalue_ratio == pytest.approx(1, abs=0.15)
+    assert actual.skeletons.distance_in_radii < 0.1
 
 
-def test_it_tells_where_the_cloud_is_noisy():
+def test_the_angle_shows_where_the_cloud_is_noisy():
     points = samples.torus(4000).points.copy()
     noisy = points[:, 0] < 0
     points[noisy] += np.random.default_rng(0).normal(scale=0.008, size=(noisy.sum(), 3))
-    found = cross_check(points)
-    assert np.nanmedian(found.angle[noisy]) > 3 * np.nanmedian(found.angle[~noisy])
-    assert found.doubtful[noisy].mean() > 5 * found.doubtful[~noisy].mean()
+    actual = cross_check(points)
+    assert np.nanmedian(actual.angle[noisy]) > 3 * np.nanmedian(actual.angle[~noisy])
+    assert actual.doubtful[noisy].mean() > 5 * actual.doubtful[~noisy].mean()
 
 
 @SPIKY
@@ -52,9 +52,9 @@ def test_the_solid_has_a_handle_that_the_skeleton_lacks():
     kept = rng.uniform(0, 1.6, 9000) < 1 + 0.6 * np.cos(across)
     ring = 0.45 + 0.37 * np.cos(across)
     points = np.column_stack([ring * np.cos(around), ring * np.sin(around), 0.37 * np.sin(across)])[kept]
-    found = cross_check(points, pipeline=pipelines.default().with_options(handle=1.0))  # which closes all loops
-    assert (found.skeleton.n_loops, found.solid.genus, found.verdict) == (0, 1, "do not trust")
-    assert "loops: 0 in the skeleton, 1 in the mesh" in found.reasons
+    actual = cross_check(points, pipeline=pipelines.default().with_options(handle=1.0))  # which closes all loops
+    assert (actual.skeleton.n_loops, actual.solid.genus, actual.verdict) == (0, 1, "do not trust")
+    assert "loops: 0 in the skeleton, 1 in the mesh" in actual.reasons
 
 
 # -------------------------------------------------------------------------------------------------------- the numbers
@@ -67,10 +67,10 @@ def test_numbers_of_points_fit_the_numbers_of_all(ring, check):
     assert check.rows.compared == check.rows.points == len(check.ours.places)
     assert (check.doubtful == (check.angle > 30)).all()
     assert check.theirs.laplacian.shape == (len(check.solid.vertices),) * 2
-    told = json.loads(json.dumps(check.to_dict(), allow_nan=False))
-    assert (told["verdict"], told["skeletons"]["loops"], told["mesh"]["genus"]) == ("agrees", [1, 1], 1)
-    assert told["points"] == {"given": 2000, "doubtful": int(check.doubtful.sum())}
-    assert len(told["rows"]["eigenvalues"]) == 50
+    facts = json.loads(json.dumps(check.to_dict(), allow_nan=False))
+    assert (facts["verdict"], facts["skeletons"]["loops"], facts["mesh"]["genus"]) == ("agrees", [1, 1], 1)
+    assert facts["points"] == {"given": 2000, "doubtful": int(check.doubtful.sum())}
+    assert len(facts["rows"]["eigenvalues"]) == 50
 
 
 def test_units_place_turn_and_order_do_not_matter(ring, check):
@@ -90,9 +90,9 @@ def test_another_pipeline(ring):
     pipeline = (
         RingBuilder() | Contractor(reducer=LPRReducer()) | LPRReducer() | Connector() | Refiner(collapse="degree")
     )
-    found = cross_check(ring.points, pipeline=pipeline)
-    np.testing.assert_array_equal(found.skeleton.vertices, skeletonize(ring.points, pipeline).vertices)
-    mesh = found.mesh_skeleton.report.stages
+    actual = cross_check(ring.points, pipeline=pipeline)
+    np.testing.assert_array_equal(actual.skeleton.vertices, skeletonize(ring.points, pipeline).vertices)
+    mesh = actual.mesh_skeleton.report.stages
     assert not any("LPRReducer" in stage for stage in mesh)  # without reductions
     assert mesh[-1].startswith("Refiner(collapse='degree'")
 
@@ -104,19 +104,19 @@ def test_a_cloud_that_is_a_mesh_is_checked_against_itself(even_ball):
     vertices, faces = even_ball(3000)
     vertices = vertices * [0.4, 0.4, 3]
     mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(vertices), o3d.utility.Vector3iVector(faces))
-    found = cross_check(mesh)
-    assert (found.verdict, found.solid.made_by) == ("agrees", "given")
-    assert found.solid.parts[0].volume == pytest.approx(0.4 * 0.4 * 3 * np.pi / 6, rel=0.01)
+    actual = cross_check(mesh)
+    assert (actual.verdict, actual.solid.made_by) == ("agrees", "given")
+    assert actual.solid.parts[0].volume == pytest.approx(0.4 * 0.4 * 3 * np.pi / 6, rel=0.01)
     assert cross_check(mesh, mesh="poisson").solid.made_by == "poisson"
-    found = cross_check(vertices, mesh=(vertices, faces))
-    assert (found.verdict, found.solid.made_by) == ("agrees", "given")
+    actual = cross_check(vertices, mesh=(vertices, faces))
+    assert (actual.verdict, actual.solid.made_by) == ("agrees", "given")
 
 
 @SPIKY
 def test_a_coarse_mesh_of_the_users_is_refined_or_refused():
     bar = o3d.geometry.TriangleMesh.create_box(1, 1, 6)
-    found = cross_check(bar)
-    assert (found.verdict, found.solid.made_by, found.solid.parts[0].volume) == ("agrees", "given", pytest.approx(6))
+    actual = cross_check(bar)
+    assert (actual.verdict, actual.solid.made_by, actual.solid.parts[0].volume) == ("agrees", "given", pytest.approx(6))
     comb = [o3d.geometry.TriangleMesh.create_box(0.01, 1, 0.01).translate((i / 100, 0, 0)) for i in range(600)]
     coarse = sum(comb, o3d.geometry.TriangleMesh())
     cloud = np.asarray(coarse.sample_points_uniformly(20000).points)
@@ -154,14 +154,14 @@ def test_points_that_are_not_finite_and_outliers(ring):
         cross_check(spoilt)
     prepare = Sampler(drop_invalid=True) | OutlierRemover() | RingBuilder()
     pipeline = prepare | Contractor(reducer=LPRReducer()) | Connector() | Refiner()
-    found = cross_check(spoilt, pipeline=pipeline)
-    assert np.isnan(found.angle[2000])
-    assert found.verdict == "agrees"
+    actual = cross_check(spoilt, pipeline=pipeline)
+    assert np.isnan(actual.angle[2000])
+    assert actual.verdict == "agrees"
 
 
 def test_duplicates_share_their_row(ring):
-    found = cross_check(np.vstack([ring.points, ring.points[:10]]))
-    np.testing.assert_array_equal(found.angle[2000:], found.angle[:10])
+    actual = cross_check(np.vstack([ring.points, ring.points[:10]]))
+    np.testing.assert_array_equal(actual.angle[2000:], actual.angle[:10])
 
 
 @SPIKY

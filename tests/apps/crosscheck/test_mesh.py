@@ -41,8 +41,8 @@ def test_our_rows_are_twice_libigls_where_the_rings_are_the_same(even_ball):
     same = np.array([{*state.rings[i]} == {*mesh[i]} for i in range(700)])
     assert same.mean() > 0.95  # the others lie on squares, which have two diagonals
     ours, theirs = cotangent_laplacian(cloud, state.rings), 2 * igl.cotmatrix(cloud, faces).tocsr()
-    for each in (theirs, mesh_laplacian(cloud, faces)):
-        assert abs(ours - each)[same].max() < 1e-10 * abs(theirs).max()
+    for item in (theirs, mesh_laplacian(cloud, faces)):
+        assert abs(ours - item)[same].max() < 1e-10 * abs(theirs).max()
 
 
 def test_the_sign(even_ball):
@@ -55,14 +55,14 @@ def test_the_sign(even_ball):
     assert (np.einsum("ij,ij->i", laplacian @ points, points) < 0).all()  # inward
 
 
-def test_it_is_the_gradient_of_the_area():
+def test_the_laplacian_is_the_gradient_of_the_area():
     # x . L x = -4 area of any mesh, torn or not manifold
     rng = np.random.default_rng(0)
     points, faces = rng.normal(size=(300, 3)), rng.integers(0, 300, (500, 3))
     faces = faces[(np.diff(np.sort(faces, axis=1)) > 0).all(axis=1)]
     area = igl.doublearea(points, faces).sum() / 2
-    found = (points * (mesh_laplacian(points, faces, cap=1e300) @ points)).sum()
-    assert found == pytest.approx(-4 * area, rel=1e-9)
+    actual = (points * (mesh_laplacian(points, faces, cap=1e300) @ points)).sum()
+    assert actual == pytest.approx(-4 * area, rel=1e-9)
 
 
 def test_rows_are_capped_as_ours_are():
@@ -95,25 +95,25 @@ def ellipsoid(n=400):
     return Solid(points, faces.astype(np.int64), "given")
 
 
-def test_it_is_the_contractor_where_rings_and_one_rings_are_the_same():
-    begun, faces = mesh_state(ellipsoid())
-    rings = convex_rings(begun.cloud - begun.cloud.mean(axis=0), faces)
+def test_the_contraction_is_ours_where_rings_and_one_rings_are_the_same():
+    state, faces = mesh_state(ellipsoid())
+    rings = convex_rings(state.cloud - state.cloud.mean(axis=0), faces)
     contractor = Contractor(max_iterations=3, stop=lambda iterations: None)
-    ours = contractor(replace(begun, rings=rings))
-    theirs = contractor.contract(begun, lambda state: mesh_laplacian(state.positions, faces))
+    ours = contractor(replace(state, rings=rings))
+    theirs = contractor.contract(state, lambda state: mesh_laplacian(state.positions, faces))
     assert len(theirs.report.iterations) == len(ours.report.iterations) == 3
     assert len(theirs) == len(ours) == 400
     np.testing.assert_allclose(theirs.positions, ours.positions, atol=1e-5)
 
 
-def test_it_starts_from_medial_places():
+def test_the_contraction_starts_from_medial_places():
     solid = ellipsoid(1500)
-    begun, _ = mesh_state(solid)
-    place = begun.frame.out_of(begun.positions) / [1, 0.6, 2.5]
+    state, _ = mesh_state(solid)
+    place = state.frame.out_of(state.positions) / [1, 0.6, 2.5]
     middle = np.abs(place[:, 2]) < 0.5
     assert np.median(np.linalg.norm(place[middle], axis=1)) < 0.75  # the surface is at 1
     area = igl.massmatrix(solid.vertices, solid.faces).diagonal()
-    mass = begun.mass[begun.map.row_of_point]
+    mass = state.mass[state.map.row_of_point]
     np.testing.assert_allclose(mass, np.maximum(area / area.mean(), 0.05), rtol=1e-9)
 
 
@@ -123,8 +123,8 @@ def test_vertices_that_fall_together_keep_the_mesh_whole():
     faces = np.where(
         (solid.faces < 200) & (np.arange(len(solid.faces)) % 2 == 0)[:, None], solid.faces + 400, solid.faces
     )
-    begun, over = mesh_state(Solid(twice, faces, "given"))
-    assert len(begun) == 400
+    state, over = mesh_state(Solid(twice, faces, "given"))
+    assert len(state) == 400
     assert igl.euler_characteristic(over) == 2
 
 

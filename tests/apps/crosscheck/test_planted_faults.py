@@ -20,10 +20,10 @@ def test_nothing_is_wrong_with_the_shape_itself(bench):
 
 
 FAULTS = {
-    "a sign flipped": lambda it: it._replace(laplacian=-it.laplacian),
-    "weights halved": lambda it: it._replace(laplacian=it.laplacian / 2),
-    "weights doubled": lambda it: it._replace(laplacian=it.laplacian * 2),
-    "mass forgotten": lambda it: it._replace(area=np.ones(len(it.area))),
+    "a sign flipped": lambda item: item._replace(laplacian=-item.laplacian),
+    "weights halved": lambda item: item._replace(laplacian=item.laplacian / 2),
+    "weights doubled": lambda item: item._replace(laplacian=item.laplacian * 2),
+    "mass forgotten": lambda item: item._replace(area=np.ones(len(item.area))),
 }
 
 
@@ -49,12 +49,12 @@ def test_a_limb_cut_off_is_named_with_its_place(bench):
     skeleton = bench.skeleton
     limb = max((path for path in skeleton.branches if (skeleton.degree[path] == 1).any()), key=lambda path: len(path))
     tip = limb[0] if skeleton.degree[limb[0]] == 1 else limb[-1]
-    left = np.setdiff1d(np.arange(len(skeleton.vertices)), limb[1:-1].tolist() + [tip])
+    remaining = np.setdiff1d(np.arange(len(skeleton.vertices)), limb[1:-1].tolist() + [tip])
     number = np.full(len(skeleton.vertices), -1)
-    number[left] = np.arange(len(left))
+    number[remaining] = np.arange(len(remaining))
     edges = number[skeleton.edges]
     edges = edges[(edges >= 0).all(axis=1)]
-    cut = Skeleton(skeleton.vertices[left], edges, skeleton.radii[left], (), (), (), report=skeleton.report)
+    cut = Skeleton(skeleton.vertices[remaining], edges, skeleton.radii[remaining], (), (), (), report=skeleton.report)
     verdict, _, reasons = bench.judged(skeleton=cut)
     assert verdict != "agrees"
     place = np.array(reasons[0].split("(")[1].split(")")[0].split(", "), float)

@@ -58,15 +58,6 @@ def test_open_ends_are_borders():
     assert (solid.parts[0].borders, solid.genus, solid.parts[0].volume) == (2, 0, None)
 
 
-def test_its_vertices_are_its_own():
-    points = torus(2000).points
-    solid, pivoted = solid_of(points), solid_of(points, ball_pivoting)
-    known = {tuple(point) for point in np.round(points, 9)}
-    assert not known & {tuple(vertex) for vertex in np.round(solid.vertices, 9)}
-    assert {tuple(vertex) for vertex in np.round(pivoted.vertices, 9)} <= known
-    assert pivoted.made_by == "ball_pivoting"
-
-
 # --------------------------------------------------------------------------------------------------- those of the user
 
 

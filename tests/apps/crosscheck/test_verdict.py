@@ -23,7 +23,7 @@ class Body(Solid):
 
     def __init__(self, solids=1, genus=2, watertight=True, made_by="poisson"):
         super().__init__(np.zeros((0, 3)), np.zeros((0, 3), int), made_by)
-        self.__dict__.update(said=(solids, genus, watertight))
+        self.__dict__.update(result=(solids, genus, watertight))
 
     n_solids = property(lambda self: self.said[0])
     genus = property(lambda self: self.said[1])
@@ -67,12 +67,12 @@ CASES = [
 
 
 @pytest.mark.parametrize(("verdict", "changes", "reason"), CASES)
-def test_what_is_said_of_each_difference(verdict, changes, reason):
-    found, probability, reasons = judged(**changes)
-    assert found == verdict
+def test_verdicts_of_differences(verdict, changes, reason):
+    actual, probability, reasons = judged(**changes)
+    assert actual == verdict
     assert bool(reasons) == (reason is not None)
     assert all(reason in text for text in reasons)
-    assert found != "agrees" or probability >= 0.9
+    assert actual != "agrees" or probability >= 0.9
 
 
 @pytest.mark.parametrize(
@@ -99,12 +99,12 @@ def test_a_mesh_at_fault_may_agree_all_the_same_but_not_one_of_something_else():
 
 
 def test_the_more_doubt_the_less_probable():
-    found = [judged(skeletons={"doubt": doubt})[1] for doubt in (0, 0.1, 0.5, 1, 2)]
-    assert found == sorted(found, reverse=True)
-    assert found[0] > 0.98
+    actual = [judged(skeletons={"doubt": doubt})[1] for doubt in (0, 0.1, 0.5, 1, 2)]
+    assert actual == sorted(actual, reverse=True)
+    assert actual[0] > 0.98
 
 
-def test_what_to_expect_is_said_of_every_verdict_with_the_numbers_of_the_page():
+def test_every_verdict_has_the_numbers_of_the_page():
     assert set(MEANINGS) == set(VERDICTS)
     page = (Path(__file__).parents[3] / "docs" / "crosscheck.md").read_text("utf-8")
     row = re.search(r"^\| all \|.*$", page, re.MULTILINE)[0]
