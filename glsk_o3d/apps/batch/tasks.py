@@ -4,7 +4,6 @@ import logging
 import math
 import os
 import socket
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -124,10 +123,9 @@ def in_one_line(error: BaseException) -> str:
 
 @contextmanager
 def _logged_warnings() -> Iterator[list[str]]:
-    """The warnings that this thread logs; they would otherwise go to the stderr of the worker."""
+    """The warnings that the package logs; they would otherwise go to the stderr of the worker."""
     messages: list[str] = []
-    thread, logger, handler = threading.get_ident(), logging.getLogger("glsk_o3d"), logging.Handler(logging.WARNING)
-    handler.addFilter(lambda record: record.thread == thread)
+    logger, handler = logging.getLogger("glsk_o3d"), logging.Handler(logging.WARNING)
     handler.emit = lambda record: messages.append(record.getMessage())  # type: ignore[method-assign]
     logger.addHandler(handler)
     try:

@@ -19,15 +19,15 @@ AWAY = ((1.0, 2.0, 3.0),)
 
 
 class Body(Solid):
-    """A solid of which the parts are said."""
+    """A solid with given counts of parts."""
 
     def __init__(self, solids=1, genus=2, watertight=True, made_by="poisson"):
         super().__init__(np.zeros((0, 3)), np.zeros((0, 3), int), made_by)
-        self.__dict__.update(result=(solids, genus, watertight))
+        self.__dict__.update(counts=(solids, genus, watertight))
 
-    n_solids = property(lambda self: self.said[0])
-    genus = property(lambda self: self.said[1])
-    is_watertight = property(lambda self: self.said[2])
+    n_solids = property(lambda self: self.counts[0])
+    genus = property(lambda self: self.counts[1])
+    is_watertight = property(lambda self: self.counts[2])
 
 
 def judged(rows=(), skeletons=(), solid=(), mesh=(0.0, 0.0), stop="settled"):
