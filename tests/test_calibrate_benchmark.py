@@ -91,7 +91,7 @@ class TestCommands:
 
         page.write_text("<!-- check -->\n<!-- end -->\n<!-- transfer -->\n<!-- end -->\n")
         (tmp_path / "images").mkdir()
-        told = call("check", saved, "--markdown", "--page", page)
+        told = call("check", saved, "--page", page)
         assert told.count("| a branch is a limb |") == 3
         assert page.read_text().count("| a branch is a limb |") == 3
         assert (tmp_path / "images" / "probabilities.png").read_bytes().startswith(b"\x89PNG")

@@ -14,7 +14,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -26,15 +26,15 @@ import typer
 from glsk_o3d import samples
 from glsk_o3d.io.formats import ply
 
-from .runs import Markdown, Output
-from .tables import number, present, save
+from .runs import Output, application
+from .tables import Table, fixed, number, present, save, table
 
 SHAPES = (
     *(samples.tube, samples.torus, samples.y_junction, samples.two_rings, samples.helix),
     partial(samples.sauropod, cameras=None),
 )
 CORRUPT = ("empty.ply", "truncated.ply", "garbage.xyz", "nan.ply", "a_ply.pcd")
-app = typer.Typer(add_completion=False)
+app = application(None)
 
 
 def write_ply(path: Path, points) -> None:
@@ -145,33 +145,30 @@ def measured(scans: Path, folder: Path, workers: int) -> list[dict]:
     return rows
 
 
+def facts_table(title: str, facts: Mapping[str, object]) -> Table:
+    """A line for each fact."""
+    cells = [[name, number(it, 4) if isinstance(it, float) else str(it)] for name, it in facts.items()]
+    return title, ["", "note"], cells
+
+
 @app.command()
 def main(
     count: Annotated[int, typer.Option("--count", min=10, help="Clouds, besides the five corrupt ones.")] = 495,
-    smallest: Annotated[int, typer.Option("--smallest", min=256, help="Points.")] = 1024,
-    largest: Annotated[int, typer.Option("--largest", min=256, help="Points.")] = 8192,
-    workers: Annotated[str, typer.Option("--workers", metavar="NUMBERS", help="With commas.")] = "1,2",
-    markdown: Markdown = False,
+    largest: Annotated[int, typer.Option("--largest", min=1024, help="Points; the smallest have 1024.")] = 8192,
     output: Output = None,
 ) -> None:
     """Measure the rate of batches, and kill a worker in the midst of one."""
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        scans = folder / "scans"
+        folder, scans = Path(name), Path(name, "scans")
         scans.mkdir()
-        make_scans(scans, count, smallest, largest)
-        each = [int(word) for word in workers.split(",")]
-        rows = [row for n in each for row in measured(scans, folder, n)]
+        make_scans(scans, count, 1024, largest)
+        rows = [row for workers in (1, 2) for row in measured(scans, folder, workers)]
         killed = kill_one(scans, folder / "killed", folder, count // 4)
-        failures = [row for row in ledger(folder / f"local{each[0]}") if row["status"] == "failed"]
-    title = f"{count} clouds of {smallest} to {largest} points and 5 corrupt ones, {os.cpu_count()} cores"
-    header = ["where", "workers", "done", "skipped", "failed", "seconds", "CPU s", "clouds/s", "load before"]
-    lines = []
-    for row in rows:
-        values = [number(row[key], 1) for key in ("wall", "cpu", "clouds_per_second", "load")]
-        lines.append([row["where"], *(str(row[key]) for key in ("workers", "done", "skipped", "failed")), *values])
-    reasons = [[Path(row["input"]).name, row["error"]] for row in failures]
-    facts = [[key, str(value)] for key, value in killed.items()]
-    tables = [(title, header, lines), ("What failed", ["input", "note"], reasons)]
-    present([*tables, ("One of two Dask workers killed", ["", "note"], facts)], markdown)
+        failed = [row for row in ledger(folder / "local1") if row["status"] == "failed"]
+    title = f"{count} clouds of 1024 to {largest} points and 5 corrupt ones, {os.cpu_count()} cores"
+    columns = {name: name for name in ("where", "workers", "done", "skipped", "failed")}
+    columns |= {"seconds": fixed("wall", 1), "CPU s": fixed("cpu", 1), "clouds/s": fixed("clouds_per_second", 1)}
+    reasons = {Path(row["input"]).name: row["error"] for row in failed}
+    tables = [table(title, rows, {**columns, "load before": fixed("load", 1)}, note=False)]
+    present([*tables, facts_table("What failed", reasons), facts_table("One of two Dask workers killed", killed)])
     save(output, [*rows, {"where": "one of two Dask workers killed", **killed}])

@@ -17,7 +17,7 @@ import typer
 from glsk_bench.table import mean_with_interval, told
 from scipy.optimize import minimize
 from scipy.special import expit
-from scipy.stats import rankdata
+from scipy.stats import mannwhitneyu
 
 from glsk_o3d.analysis import compare
 from glsk_o3d.data.decisions import logistic
@@ -26,8 +26,8 @@ from glsk_o3d.pipelines import default
 
 from .clouds import Case, cases
 from .questions import questions
-from .runs import Jobs, Markdown, Output, Own, Saved, Shapes, Variants, application, run, study
-from .tables import BLUE, GREY, Table, Tables, fill, keep, number, page_with, pick, present, read, save, sheet
+from .runs import Jobs, Output, Own, Page, Saved, Shapes, Variants, application, publish, run
+from .tables import BLUE, GREY, Tables, fill, grouped, keep, number, pick, present, read, save, sheet
 
 PENALTY = 1.0  # of half a weight's square, as if it were drawn from a normal distribution; the constant has none
 
@@ -82,17 +82,22 @@ def by_question(rows: list[dict]) -> dict[str, Answered]:
 
 
 def fitted(answered: Answered) -> dict[str, float]:
-    """The weights with which the questions are answered best: least log loss, with a light L2 penalty."""
-    table = np.column_stack([np.ones(len(answered.facts)), answered.facts])
-    penalty = PENALTY * np.append(0, np.ones(len(answered.names)))
+    """The weights with which the questions are answered best."""
+    weights = logistic_weights(answered.facts, answered.is_so, PENALTY)
+    return dict(zip(["constant", *answered.names], weights.tolist(), strict=True))
+
+
+def logistic_weights(facts: np.ndarray, is_so: np.ndarray, penalty: float) -> np.ndarray:
+    """A constant and a weight for each fact, (1 + f,) float array: least log loss, with a light L2 penalty."""
+    table = np.column_stack([np.ones(len(facts)), facts])
+    penalties = penalty * np.append(0, np.ones(facts.shape[1]))
 
     def loss(weights):
         total = table @ weights
-        value = np.logaddexp(0, np.where(answered.is_so, -total, total)).sum() + penalty @ weights**2 / 2
-        return value, table.T @ (expit(total) - answered.is_so) + penalty * weights
+        value = np.logaddexp(0, np.where(is_so, -total, total)).sum() + penalties @ weights**2 / 2
+        return value, table.T @ (expit(total) - is_so) + penalties * weights
 
-    found = minimize(loss, np.zeros(table.shape[1]), jac=True, method="BFGS").x
-    return dict(zip(["constant", *answered.names], found.tolist(), strict=True))
+    return minimize(loss, np.zeros(table.shape[1]), jac=True, method="BFGS").x
 
 
 def said(weights: Mapping[str, float], answered: Answered) -> np.ndarray:
@@ -111,8 +116,9 @@ def area_under_curve(chance: np.ndarray, is_so: np.ndarray) -> float:
 
     NaN without such pairs.
     """
-    n, m = np.count_nonzero(is_so), np.count_nonzero(~is_so)
-    return (rankdata(chance)[is_so].sum() - n * (n + 1) / 2) / (n * m) if n and m else np.nan
+    if is_so.all() or not is_so.any():
+        return np.nan
+    return mannwhitneyu(chance[is_so], chance[~is_so]).statistic / (is_so.sum() * (~is_so).sum())
 
 
 def parts(chance: np.ndarray, answered: Answered) -> list[tuple[int, float, tuple[float, float, float]]]:
@@ -179,12 +185,6 @@ def draw_reliability(told_of: Mapping[str, tuple[np.ndarray, Answered]], folder:
     keep(figure, folder, "probabilities")
 
 
-def weights_of(answered: Mapping[str, Answered], without: str | None = None) -> Weights:
-    """By question: fitted to all questions, or to those of all families but one."""
-    some = {about: it if without is None else it.of(it.families != without) for about, it in answered.items()}
-    return {about: fitted(it) for about, it in some.items()}
-
-
 def measure(case: Case, weights: Weights) -> dict[str, float]:
     """A skeleton of `default` with these weights, against its axis."""
     points, truth = case.load()
@@ -198,21 +198,19 @@ def measure(case: Case, weights: Weights) -> dict[str, float]:
             ASKED[about].weights = own
 
 
-def table(rows: list[dict]) -> Table:
+def transfer_tables(rows: list[dict]) -> Tables:
     """By family: shares with weights fitted to all families, with those fitted to the others, and the difference."""
     lines = []
-    for family in [*dict.fromkeys(row["family"] for row in rows), "all"]:
-        here = rows if family == "all" else pick(rows, family=family)
-        rows_of = (pick(here, weights=name) for name in (SEEN, UNSEEN))
-        seen, unseen = ({(row["shape"], row["variant"]): row for row in each} for each in rows_of)
+    for family, here in {**grouped(rows, "family"), "all": rows}.items():
+        seen, unseen = pick(here, weights=SEEN), pick(here, weights=UNSEEN)  # the same clouds in the same order
         cells = []
         for name in MEASURES:
-            sides = [[float(side[cloud].get(name, False)) for cloud in seen] for side in (seen, unseen)]
-            change = mean_with_interval([shape for shape, _ in seen], [b - a for a, b in zip(*sides, strict=True)])
-            cells += [*(number(sum(side) / len(seen), 2) for side in sides), told(*change, 2, sign="+")]
+            sides = [np.array([bool(row.get(name)) for row in side], float) for side in (seen, unseen)]
+            change = mean_with_interval([row["shape"] for row in seen], sides[1] - sides[0])
+            cells += [*(number(side.mean(), 2) for side in sides), told(*change, 2, sign="+")]
         lines.append([family, str(len(seen)), *cells])
     header = [f"{name}{word}" for name in MEASURES for word in (", all", ", others", ": change")]
-    return "weights fitted to all families, and to the others", ["family", "clouds", *header], lines
+    return [("weights fitted to all families, and to the others", ["family", "clouds", *header], lines)]
 
 
 def rows_of(sources: list[Path] | None, own: bool, variant: str, shapes: str, jobs: int) -> list[dict]:
@@ -252,22 +250,15 @@ def check(
     variant: Variants = EVERY,
     shapes: Shapes = "",
     leave_family_out: Annotated[
-        bool,
-        typer.Option(
-            "--leave-family-out", help="Not the package's weights, but for each family those fitted to the others."
-        ),
+        bool, typer.Option("--leave-family-out", help="For each family, weights that were fitted to the others.")
     ] = False,
     learnt: Annotated[
         Path | None,
         typer.Option("--from", metavar="JSON", exists=True, dir_okay=False, help="Fitted to these, else to the same."),
     ] = None,
-    page: Annotated[
-        Path | None,
-        typer.Option("--page", help="Put the tables into this page, a picture beside it.", callback=page_with("check")),
-    ] = None,
+    page: Page = None,
     jobs: Jobs = 2,
     output: Output = None,
-    markdown: Markdown = False,
 ) -> None:
     """Whether what has some probability is so as often."""
     rows = rows_of(sources, own, variant, shapes, jobs)
@@ -275,29 +266,34 @@ def check(
     found = by_question(rows)
     if leave_family_out:
         others = by_question(read(learnt)["rows"]) if learnt else found
-        told = {about: (without_family(it, others[about]), it) for about, it in found.items()}
+        judged = {about: (without_family(it, others[about]), it) for about, it in found.items()}
     else:
-        told = {about: (said(ASKED[about].weights, it), it) for about, it in found.items()}
-    shown = tables(told)
-    present(shown, markdown)
+        judged = {about: (said(ASKED[about].weights, it), it) for about, it in found.items()}
+    shown = tables(judged)
+    present(shown)
     if page is not None:
         fill(page, {"check": shown})
-        draw_reliability(told, page.parent / "images")
+        draw_reliability(judged, page.parent / "images")
 
 
-@study(app, lambda rows: [table(rows)], "transfer")
+@app.command()
 def transfer(
     learnt: Saved,
     folder: Annotated[Path, typer.Argument(metavar="DIR", exists=True, file_okay=False, help="Other shapes.")],
     variant: Variants = "*",
     shapes: Shapes = "",
     jobs: Jobs = 2,
-) -> list[dict]:
+    output: Output = None,
+    page: Page = None,
+) -> None:
     """Right topologies with weights fitted to all families, and for each family with those fitted to the others."""
     answered = by_question(read(learnt)["rows"])
     found = cases(folder, False, variant, shapes)
-    seen = weights_of(answered)
-    unseen = {family: weights_of(answered, family) for family in {case.facts["family"] for case in found}}
+    seen = {about: fitted(it) for about, it in answered.items()}
+    unseen = {
+        family: {about: fitted(it.of(it.families != family)) for about, it in answered.items()}
+        for family in {case.facts["family"] for case in found}
+    }
     work = [(dict(weights=SEEN, **case.facts), (case, seen)) for case in found]
     work += [(dict(weights=UNSEEN, **case.facts), (case, unseen[case.facts["family"]])) for case in found]
-    return run(measure, work, jobs)
+    publish(run(measure, work, jobs), transfer_tables, output, page, "transfer")

@@ -35,23 +35,22 @@ EXTREMES = (-1, 0, 1, 2**31 - 1, 2**31, 2**32, 2**63, 10**18, 10**400, "1e308", 
 ENDINGS = (".ply", ".pcd", ".xyz", ".obj", ".stl", ".las", ".laz", ".e57", ".json", ".npz", ".swc")
 
 
-def file_case(rng: np.random.Generator, folder: Path) -> tuple[str, str, list[str]]:
-    """Read one damaged file, written into a folder: its kind, whether it was ``"read"`` or ``"refused"``, findings."""
+def damaged_file(rng: np.random.Generator) -> tuple[str, str, str, bytes]:
+    """The kind and ending of a file in words; its kind, its ending, perhaps a wrong one, and its bytes."""
     names = [*seeds()]
     name = names[rng.integers(len(names))]
     kind, ending = name.split()[:2]
     data = damaged(seeds()[name], rng)
-    if kind in ("cloud", "skeleton") and rng.random() < 0.05:
-        ending = str(rng.choice(ENDINGS))
-    return f"{kind} {name.split()[1]}", *read(kind, ending, data, folder)
+    wrong = kind in ("cloud", "skeleton") and rng.random() < 0.05
+    return f"{kind} {ending}", kind, str(rng.choice(ENDINGS)) if wrong else ending, data
 
 
-def read(kind: str, ending: str, data: bytes, folder: Path) -> tuple[str, list[str]]:
-    """Read a file, written into a folder: whether it was ``"read"`` or ``"refused"``, and findings."""
-    path = folder / ("ledger.jsonl" if kind == "ledger" else f"f{ending}")
-    path.write_bytes(data)
-    with warnings.catch_warnings():
+def read(kind: str, ending: str, data: bytes) -> tuple[str, list[str]]:
+    """Whether a file was ``"read"`` or ``"refused"``, and findings."""
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("error")
+        path = Path(folder, "ledger.jsonl" if kind == "ledger" else f"f{ending}")
+        path.write_bytes(data)
         try:
             READERS[kind](path)
             return "read", []
@@ -62,8 +61,6 @@ def read(kind: str, ending: str, data: bytes, folder: Path) -> tuple[str, list[s
             if isinstance(error.__cause__, MemoryError) or "bad_alloc" in message or "Unable to allocate" in message:
                 findings.append("it asked for more memory than there is")
             return "refused", findings
-        finally:
-            path.unlink()
 
 
 def damaged(data: bytes, rng: np.random.Generator) -> bytes:

@@ -21,7 +21,7 @@ from .clouds import builtin, cases
 from .runs import run
 from .stages import counts_of
 from .stopwatch import MB, fresh_python, peak, reset_peak, resident
-from .tables import Tables, cells_of, number, short
+from .tables import Tables, brief, fixed, table
 
 STEP = 0.001  # between the places of a curve at which `large` measures it, as a share of the diagonal
 HUGE_BLOCK = 1_000_000  # points written at a time
@@ -106,20 +106,14 @@ def save_cloud(path: Path, points: np.ndarray, file: bool) -> None:
 
 def large_tables(rows: list[dict]) -> Tables:
     """A line for each shape and size."""
-    files = any("file_cpu" in row for row in rows)
-    header = ["", "points", "CPU s", "MB", "sampled", "contracted", "vertices", "mean %", "largest %", "loops", "same"]
-    header += ["file CPU s", "file wall s", "file MB"] if files else []
-
-    def cells(row):
-        counts = [str(row[key]) for key in ("sampled", "contracted", "vertices")]
-        away = [number(row.get(key), 2) for key in ("mean", "most")]
-        same = {True: "yes", False: "no", None: "-"}[row.get("same_loops")]
-        found = [short(row["cpu"]), number(row["peak"], 0), *counts, *away, str(row["loops"]), same]
-        more = [short(row["file_cpu"]), short(row["file_wall"]), number(row["file_peak"], 0)] if files else []
-        return found + more
-
-    lines = cells_of(rows, ["shape", "n"], cells, len(header) - 2)
-    return [(f"default, against {min(row['n'] for row in rows)} points", [*header, "note"], lines)]
+    columns = {"": "shape", "points": "n", "CPU s": brief("cpu"), "MB": fixed("peak", 0)}
+    columns |= {name: name for name in ("sampled", "contracted", "vertices")}
+    columns |= {"mean %": fixed("mean"), "largest %": fixed("most"), "loops": "loops"}
+    columns |= {"same": lambda row: "yes" if row["same_loops"] else "no"}
+    if any("file_cpu" in row for row in rows):
+        columns |= {"file CPU s": brief("file_cpu"), "file wall s": brief("file_wall")}
+        columns |= {"file MB": fixed("file_peak", 0)}
+    return [table(f"default, against {min(row['n'] for row in rows)} points", rows, columns)]
 
 
 def noisy_blocks(n: int, seed: int = 0) -> Iterator[np.ndarray]:
@@ -191,12 +185,8 @@ def shape(skeleton: Skeleton) -> dict[str, int]:
 
 def huge_tables(rows: list[dict]) -> Tables:
     """A line for each file."""
-    header = ["", "points", "file GB", "CPU s", "wall s", "MB", "vertices", "components", "loops", "ends"]
-    lines = []
-    for row in rows:
-        seconds = [short(row[key]) if key in row else "-" for key in ("file_cpu", "file_wall")]
-        size, most = number(row.get("size"), 2), number(row.get("file_peak"), 0)
-        counts = [str(row.get(key, "-")) for key in ("vertices", "components", "loops", "ends")]
-        away = [number(row.get(key), 2) for key in ("mean", "most")]
-        lines.append([row["file"], str(row["n"]), size, *seconds, most, *counts, *away])
-    return [("from disk to disk", [*header, "mean %", "largest %"], lines)]
+    columns = {"": "file", "points": "n", "file GB": fixed("size"), "CPU s": brief("file_cpu")}
+    columns |= {"wall s": brief("file_wall"), "MB": fixed("file_peak", 0)}
+    columns |= {name: name for name in ("vertices", "components", "loops", "ends")}
+    columns |= {"mean %": fixed("mean"), "largest %": fixed("most")}
+    return [table("from disk to disk", rows, columns, note=False)]
