@@ -37,26 +37,21 @@ CORRUPT = ("empty.ply", "truncated.ply", "garbage.xyz", "nan.ply", "a_ply.pcd")
 app = application(None)
 
 
-def write_ply(path: Path, points) -> None:
-    """Write points as binary PLY."""
-    rows = ply.rows_of(dict(zip("xyz", np.asarray(points, float).T, strict=True)))
-    path.write_bytes(ply.header_of(rows.dtype, len(rows)) + rows.tobytes())
-
-
 def make_scans(folder: Path, count: int, smallest: int, largest: int) -> None:
     """Write clouds of all kinds, sizes and seeds, and in their midst five that are corrupt."""
     rng = np.random.default_rng(0)
     for i in range(count):
         n = int(smallest * (largest / smallest) ** rng.random())
-        write_ply(folder / f"{i:04}.ply", SHAPES[i % len(SHAPES)](n, noise=0.002 * (i % 3), seed=i).points)
+        cloud = SHAPES[i % len(SHAPES)](n, noise=0.002 * (i % 3), seed=i).points
+        ply.save(folder / f"{i:04}.ply", {"positions": cloud})
     whole = samples.torus(1024).points
     empty, cut, garbage, nan, other = (folder / f"{count * i // 6:04}_{name}" for i, name in enumerate(CORRUPT, 1))
     empty.touch()
-    write_ply(cut, whole)
+    ply.save(cut, {"positions": whole})
     cut.write_bytes(cut.read_bytes()[:-5000])
     garbage.write_text("this is no cloud\n" * 100)
-    write_ply(nan, np.full_like(whole, np.nan))
-    write_ply(other, whole)
+    ply.save(nan, {"positions": np.full_like(whole, np.nan)})
+    ply.save(other, {"positions": whole})
 
 
 def command(scans: Path, out: Path, *words: str) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -25,7 +24,7 @@ from glsk_o3d.samples.capsules import visible
 
 from .cylinder_models import read_cylinder_model
 from .peers import PEERS, Graph, Peer, ours, separators_of_points, skeleton_of
-from .stopwatch import MB, peak, reset_peak, resident
+from .stopwatch import once
 from .tables import Tables, brief, good, grouped, number, pick, table
 
 CONDITIONS = ("clean", "noise", "missing", "uneven")
@@ -376,17 +375,12 @@ def measure_tables(rows: list[dict]) -> Tables:
     return [(f"Errors of {len(grouped(rows, 'tree'))} trees, in percent", header, lines)]
 
 
-def once(path: Path, pipeline: str) -> dict:
+def measure_scan(path: Path, pipeline: str) -> dict:
     """One run on a saved scan, to be made in a fresh process."""
-    points = np.load(path)
     name, options = PIPELINES[pipeline]
-    chosen = named_pipeline(name).with_options(options)
-    reset_peak()
-    before, start = resident(), (time.process_time(), time.perf_counter())
-    skeleton = chosen(points)
-    facts = dict(cpu=time.process_time() - start[0], wall=time.perf_counter() - start[1], peak=(peak() - before) / MB)
+    skeleton, costs = once(named_pipeline(name).with_options(options), np.load(path))
     counts = dict(components=skeleton.n_components, loops=skeleton.n_loops, tips=len(skeleton.leaves))
-    return facts | counts | dict(traced=skeleton.report.n_traced)
+    return costs | counts | dict(traced=skeleton.report.n_traced)
 
 
 def large_tables(rows: list[dict]) -> Tables:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import tempfile
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import numpy as np
 
 from glsk_o3d import Skeleton, read_cloud, read_skeleton, save_skeleton, skeletonize
 from glsk_o3d.analysis.curves import distances
-from glsk_o3d.interop.packages import import_open3d, require
+from glsk_o3d.interop.packages import require
 from glsk_o3d.io.formats import ply
 from glsk_o3d.pipelines import default
 from glsk_o3d.samples import sauropod
@@ -20,7 +19,7 @@ from glsk_o3d.samples import sauropod
 from .clouds import builtin, cases
 from .runs import run
 from .stages import counts_of
-from .stopwatch import MB, fresh_python, peak, reset_peak, resident
+from .stopwatch import fresh_python, once
 from .tables import Tables, brief, fixed, table
 
 STEP = 0.001  # between the places of a curve at which `large` measures it, as a share of the diagonal
@@ -50,15 +49,11 @@ def spent(work: str, cloud: Path, *words: str | Path) -> dict[str, float]:
     return json.loads(told.read_text()) | dict(file_wall=wall)
 
 
-def once(path: Path, file: bool) -> dict:
+def measure(path: Path, file: bool) -> dict:
     """One run of `default` on a saved cloud, to be made in a fresh process; its curve is saved beside the cloud."""
-    reset_peak()
-    before = resident()
     points = np.load(path)
-    start = time.process_time(), time.perf_counter()
-    skeleton = default()(points)
-    costs = dict(cpu=time.process_time() - start[0], wall=time.perf_counter() - start[1])
-    facts = costs | dict(peak=(peak() - before) / MB, sampled=skeleton.report.n_sampled) | counts_of(skeleton)
+    skeleton, costs = once(default(), points)
+    facts = costs | dict(sampled=skeleton.report.n_sampled) | counts_of(skeleton)
     facts["diagonal"] = float(np.linalg.norm(np.ptp(points, axis=0)))
     curve = Skeleton(skeleton.vertices, skeleton.edges, skeleton.radii, (), (), ())
     save_skeleton(curve, path.with_suffix(".json"))
@@ -81,9 +76,12 @@ def measure_large(sizes: list[int], shapes: str, file: bool, jobs: int) -> list[
         with tempfile.TemporaryDirectory() as folder:
             paths = {n: Path(folder, f"{n}.npy") for n in sizes}
             for n, path in paths.items():
-                save_cloud(path, builtin(shape, f"clean_{n}")[0], file)
+                points = builtin(shape, f"clean_{n}")[0]
+                np.save(path, points)
+                if file:
+                    ply.save(path.with_suffix(".ply"), {"positions": points})
             work = [(dict(measure="large", n=n, shape=shape), (path, file)) for n, path in paths.items()]
-            here = run(once, work, min(jobs, 1), fresh=True)
+            here = run(measure, work, min(jobs, 1), fresh=True)
             base = here[0]
             for row in here[1:]:
                 if "failure" not in row and "failure" not in base:
@@ -92,16 +90,6 @@ def measure_large(sizes: list[int], shapes: str, file: bool, jobs: int) -> list[
                     row |= dict(base=base["n"], mean=mean, most=most, same_loops=row["loops"] == base["loops"])
         rows += here
     return rows
-
-
-def save_cloud(path: Path, points: np.ndarray, file: bool) -> None:
-    """As an array, and where asked for as PLY beside it."""
-    np.save(path, points)
-    if file:
-        o3d = import_open3d()
-        cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
-        if not o3d.io.write_point_cloud(str(path.with_suffix(".ply")), cloud):
-            raise OSError(f"{path.with_suffix('.ply')} could not be written: is the disk full?")
 
 
 def large_tables(rows: list[dict]) -> Tables:

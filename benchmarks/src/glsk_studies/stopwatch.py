@@ -9,13 +9,16 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
 
+import numpy as np
 from scipy.spatial import cKDTree
+
+from glsk_o3d import Skeleton
 
 PACKAGE = "glsk_o3d"
 REST = "rest"  # what belongs to no stage
@@ -215,6 +218,15 @@ def reset_peak() -> bool:
 def _status(key: str) -> int:
     lines = _STATUS.read_text().splitlines() if _STATUS.exists() else ()
     return next((int(line.split()[1]) * 1024 for line in lines if line.startswith(key)), 0)
+
+
+def once(pipeline: Callable[[np.ndarray], Skeleton], points: np.ndarray) -> tuple[Skeleton, dict[str, float]]:
+    """A skeleton, its CPU and wall seconds, and the most memory beyond what was resident before, in MB."""
+    reset_peak()
+    before, cpu, wall = resident(), *_clocks()
+    skeleton = pipeline(points)
+    cpu, wall = (now - then for now, then in zip(_clocks(), (cpu, wall), strict=True))
+    return skeleton, dict(cpu=cpu, wall=wall, peak=(peak() - before) / MB)
 
 
 def in_turns(tasks: dict, repeat: int, stages: Mapping[str, Stage] | None = None) -> dict[Any, tuple[Any, dict]]:

@@ -23,8 +23,9 @@ from scipy.spatial.transform import Rotation
 from glsk_o3d import Skeleton, read_skeleton, samples
 from glsk_o3d.analysis.curves import along, pieces
 from glsk_o3d.apps.batch.tiles import Grid
+from glsk_o3d.io.formats import ply
 
-from .batch import facts_table, glsk_batch, kill_one, ledger, write_ply
+from .batch import facts_table, glsk_batch, kill_one, ledger
 from .runs import Output, application, writable
 from .tables import BLUE, INK, present, save, save_figure, sheet
 
@@ -160,7 +161,7 @@ def main(
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         scene, path = make_scene(points), folder / "scene.ply"
-        write_ply(path, scene.points)
+        ply.save(path, {"positions": scene.points})
         undisturbed = glsk_batch(path, folder / "whole", "--tiles", str(SIZE), "--workers", "2")
         most = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 2**20
         rows = {row["name"]: row for row in ledger(folder / "whole")}
