@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import tempfile
 import warnings
 from collections.abc import Callable
@@ -120,65 +119,38 @@ def _clouds(folder: Path) -> dict[str, bytes]:
     o3d = import_open3d()
     points = samples.torus(60).points
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
-    cloud.colors = cloud.normals = cloud.points
+    cloud.normals = cloud.points
+    cloud.colors = o3d.utility.Vector3dVector(np.abs(points) % 1)
     mesh = o3d.geometry.TriangleMesh.create_torus(1, 0.3, 6, 5)
-    mesh.compute_vertex_normals()
-    found = {}
-    for ending, options in {
-        ".pcd binary": {},
-        ".pcd ascii": {"write_ascii": True},
-        ".pcd compressed": {"compressed": True},
-        ".ply binary": {},
-        ".ply ascii": {"write_ascii": True},
-        ".xyz": {},
-    }.items():
-        path = folder / f"s{ending.split()[0]}"
-        o3d.io.write_point_cloud(str(path), cloud, **options)
-        found[f"cloud {ending}"] = path.read_bytes()
-    for ending in (".obj", ".stl", ".ply mesh"):
-        path = folder / f"m{ending.split()[0]}"
-        o3d.io.write_triangle_mesh(str(path), mesh)
-        found[f"cloud {ending}"] = path.read_bytes()
+    o3d.io.write_point_cloud(str(folder / "binary.pcd"), cloud)
+    o3d.io.write_point_cloud(str(folder / "ascii.pcd"), cloud, write_ascii=True)
+    o3d.io.write_point_cloud(str(folder / "compressed.pcd"), cloud, compressed=True)
+    o3d.io.write_point_cloud(str(folder / "binary.ply"), cloud)
+    o3d.io.write_point_cloud(str(folder / "ascii.ply"), cloud, write_ascii=True)
+    o3d.io.write_point_cloud(str(folder / "points.xyz"), cloud)
+    o3d.io.write_triangle_mesh(str(folder / "mesh.obj"), mesh, write_vertex_normals=False)
+    o3d.io.write_triangle_mesh(str(folder / "mesh.stl"), mesh.compute_vertex_normals())
+    o3d.io.write_triangle_mesh(str(folder / "mesh.ply"), mesh)
     rows = "\n".join(",".join(f"{value:.3f}" for value in row) + ",1" for row in points)
-    found["cloud .csv"] = f"x,y,z,label\n{rows}\n".encode()
-    found["cloud .txt"] = rows.replace(",", " ").encode()
+    (folder / "table.csv").write_text(f"x,y,z,label\n{rows}\n")
+    (folder / "table.txt").write_text(rows.replace(",", " "))
     head = "ply\nformat ascii 1.0\nelement extra 2\nproperty list uchar int of\nelement vertex 60\n"
     head += "".join(f"property double {axis}\n" for axis in "xyz") + "property float label\nend_header\n2 0 1\n1 5\n"
-    found["cloud .ply list"] = (head + found["cloud .txt"].decode() + "\n").encode()
+    (folder / "list.ply").write_text(head + rows.replace(",", " ") + "\n")
     if find_spec("laspy") and find_spec("lazrs"):
         import laspy
 
         for number in (0, 3, 7):
             scan = laspy.LasData(laspy.LasHeader(point_format=number, version="1.4" if number == 7 else "1.2"))
             scan.x, scan.y, scan.z = points.T
-            for ending in (".las", ".laz"):
-                scan.write(str(folder / f"s{ending}"))
-                found[f"cloud {ending} {number}"] = (folder / f"s{ending}").read_bytes()
-            found[f"cloud .laz {number} chunks"] = _in_chunks(
-                found[f"cloud .laz {number}"], scan.points.array.tobytes()
-            )
+            scan.write(str(folder / f"format{number}.las"))
+            scan.write(str(folder / f"format{number}.laz"))
     if find_spec("pye57"):
         import pye57
 
-        with pye57.E57(str(folder / "s.e57"), mode="w") as file:
+        with pye57.E57(str(folder / "scan.e57"), mode="w") as file:
             file.write_scan_raw(dict(zip(("cartesianX", "cartesianY", "cartesianZ"), points.T.copy(), strict=True)))
-        found["cloud .e57"] = (folder / "s.e57").read_bytes()
-    return found
-
-
-def _in_chunks(laz: bytes, points: bytes) -> bytes:
-    """The same file with chunks of 16 points each."""
-    import lazrs
-
-    record, start = laz.index(b"laszip encoded") - 2 + 54, int.from_bytes(laz[96:100], "little")
-    stream = io.BytesIO(laz[: record + 12] + (16).to_bytes(4, "little") + laz[record + 16 : start])
-    length = int.from_bytes(laz[record - 34 : record - 32], "little")
-    vlr = lazrs.LazVlr(stream.getvalue()[record : record + length])
-    stream.seek(start)
-    packer = lazrs.LasZipCompressor(stream, vlr)
-    packer.compress_many(points)
-    packer.done()
-    return stream.getvalue()
+    return {f"cloud {path.suffix} {path.stem}": path.read_bytes() for path in sorted(folder.iterdir())}
 
 
 def _skeletons(folder: Path) -> dict[str, bytes]:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from statistics import fmean
 
 import numpy as np
-import typer
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
@@ -41,46 +39,24 @@ NOISE = 0.001  # share of the diagonal, 7 mm
 PIPELINES = {"default, untraced": ("default", {"Tracer.surface": 0}), "default": ("default", {}), "tree": ("tree", {})}
 
 
-@dataclass(frozen=True)
-class SparseTree:
-    """A cloud in some condition and its axis, z up: of a file ``NAME.npz``, or the built-in tree of a seed."""
-
-    name: str
-    condition: str
-    path: Path | None = None
-    up: str = "z"
-
-    @property
-    def facts(self) -> dict[str, str]:
-        """What a row says of it."""
-        return dict(condition=self.condition, tree=self.name)
-
-    def load(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Points (n, 3), nodes (M, 3) and edges (E, 2)."""
-        if self.path is None:
-            return builtin(int(self.name), self.condition)
-        turn = upright(self.up)
-        with np.load(self.path) as archive:
-            return archive[self.condition][:, turn].astype(float), archive["nodes"][:, turn], archive["edges"]
+def sparse_tree(name: str, condition: str, path: Path | None, up: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points (n, 3), nodes (M, 3) and edges (E, 2) of a tree, z up: of ``NAME.npz``, or the built-in one of a seed."""
+    if path is None:
+        return builtin(int(name), condition)
+    turned = np.roll(np.arange(3), 2 - "xyz".index(up))
+    with np.load(path) as archive:
+        return archive[condition][:, turned].astype(float), archive["nodes"][:, turned], archive["edges"]
 
 
-def upright(up: str) -> np.ndarray:
-    """The axes x, y and z, turned round so that the one that points up is the last: (3,) int array."""
-    if up not in ("x", "y", "z"):
-        raise typer.BadParameter(f"--up {up}: there are x, y and z")
-    return np.roll(np.arange(3), 2 - "xyz".index(up))
-
-
-def sparse_trees(folder: Path | None, up: str, trees: int) -> list[SparseTree]:
-    """The trees of a folder in all their conditions, or so many built-in ones."""
-    upright(up)
+def sparse_trees(folder: Path | None, up: str, trees: int) -> list[tuple[str, str, Path | None, str]]:
+    """What `sparse_tree` is given for the trees of a folder in all their conditions, or for so many built-in ones."""
     if folder is None:
-        return [SparseTree(str(seed), condition) for condition in CONDITIONS for seed in range(trees)]
+        return [(str(seed), condition, None, up) for condition in CONDITIONS for seed in range(trees)]
     found = []
     for path in sorted(folder.glob("*.npz")):
         with np.load(path) as archive:
-            found += [SparseTree(path.stem, it, path, up) for it in CONDITIONS if it in archive.files]
-    return sorted(found, key=lambda tree: CONDITIONS.index(tree.condition))
+            found += [(path.stem, condition, path, up) for condition in CONDITIONS if condition in archive.files]
+    return sorted(found, key=lambda tree: CONDITIONS.index(tree[1]))
 
 
 def builtin(seed: int, condition: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -107,29 +83,8 @@ def solid(seed: int, condition: str) -> samples.Sample:
     return samples.Sample(seen.points + noise, seen.nodes, seen.edges, seen.radii, seen.name)
 
 
-@dataclass(frozen=True)
-class Scan:
-    """A tree with a surface as a lidar saw it, in metres."""
-
-    points: np.ndarray
-    tree: samples.Sample
-    scanners: int
-    noise: float
-    density: float
-
-    @property
-    def stem_diameter(self) -> float:
-        """1.3 m above the ground, which is z = 0."""
-        return float(np.interp(BREAST_HEIGHT, self.tree.nodes[:7, 2], 2 * self.tree.radii[:7]))
-
-    @property
-    def volume(self) -> float:
-        """Above the ground."""
-        return volume(self.tree) - 2 / 3 * np.pi * float(self.tree.radii[0]) ** 3
-
-
-def scan(seed: int) -> Scan:
-    """A tree of 8 to 15 m and 15 to 50 cm, drawn at random, and what one to three scanners 8 to 20 m away see of it.
+def scan(seed: int) -> tuple[samples.Sample, np.ndarray, int]:
+    """A tree of 8 to 15 m and 15 to 50 cm, what scanners 8 to 20 m away see of it, and how many: one to three.
 
     A point is as probable as the surface faces the scanner. Its range has 2 to 5 mm of noise and its ray that of a beam
     3 mm wide that widens by 0.3 mrad. Of grazing ones a tenth fly up to 20 cm behind the edge, and a hundred points of
@@ -160,7 +115,7 @@ def scan(seed: int) -> Scan:
         fly = (faces[seen] < 0.15) & (rng.random(len(seen)) < 0.1)
         ranges = away + noise * rng.normal(size=len(seen)) + fly * rng.uniform(0, 0.2, len(seen))
         found.append(place + ranges[:, None] * unit(rays))
-    return Scan(np.concatenate(found), tree, scanners, noise, density)
+    return tree, np.concatenate(found), scanners
 
 
 def volume(tree: samples.Sample, n: int = 4_000_000) -> float:
@@ -269,9 +224,9 @@ def score(points: np.ndarray, axis: Skeleton, found: Skeleton) -> dict[str, floa
     )
 
 
-def measure_curve(tree: SparseTree, tool: Peer) -> dict:
+def measure_curve(tree: tuple[str, str, Path | None, str], tool: Peer) -> dict:
     """One skeleton against its axis."""
-    points, nodes, edges = tree.load()
+    points, nodes, edges = sparse_tree(*tree)
     found, cpu = tool.timed(points)
     return dict(cpu=cpu, points=len(points)) | score(points, skeleton_of(nodes, edges), found)
 
@@ -301,7 +256,7 @@ def measure_tree(seed: int, condition: str) -> dict[str, float]:
     drawn = solid(seed, condition)
     skeleton = pipelines.tree()(drawn.points)
     found = tree_measures(skeleton)
-    stem = np.interp(BREAST_HEIGHT + drawn.points[:, 2].min(), drawn.nodes[:7, 2], 2 * drawn.radii[:7])
+    stem = diameter_at(drawn, BREAST_HEIGHT + drawn.points[:, 2].min())
     nearest = cKDTree(drawn.nodes).query(skeleton.vertices)[1]
     true = dict(
         volume=(cylinders(skeleton).volume.sum(), volume(drawn)),
@@ -313,13 +268,21 @@ def measure_tree(seed: int, condition: str) -> dict[str, float]:
 
 
 def measure_stem(seed: int) -> dict[str, float]:
-    """Diameter and volume of a scanned tree, as found and as they are."""
-    scanned = scan(seed)
-    found = tree_measures(pipelines.tree()(scanned.points))
-    said = dict(stem_diameter=found.stem_diameter, stem_arc=found.stem_arc, volume=sum(found.volume))
-    true = dict(true_diameter=scanned.stem_diameter, true_volume=scanned.volume)
-    more = dict(height=found.height, noise=scanned.noise, doubts=len(found.doubts))
-    return said | true | more | dict(scanners=scanned.scanners, density=scanned.density)
+    """Diameter and volume of a scanned tree, as found and as they are above the ground, which is z = 0."""
+    tree, points, scanners = scan(seed)
+    found = tree_measures(pipelines.tree()(points))
+    return dict(
+        scanners=scanners,
+        stem_diameter=found.stem_diameter,
+        true_diameter=diameter_at(tree, BREAST_HEIGHT),
+        volume=sum(found.volume),
+        true_volume=volume(tree) - 2 / 3 * np.pi * float(tree.radii[0]) ** 3,
+    )
+
+
+def diameter_at(tree: samples.Sample, height: float) -> float:
+    """That of the true stem, whose nodes are the first."""
+    return float(np.interp(height, tree.nodes[:7, 2], 2 * tree.radii[:7]))
 
 
 def measure_model(cloud: Path, model: Path, unit: float) -> dict:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 import typer
@@ -26,7 +26,7 @@ Trees = Annotated[int, typer.Option("--trees", min=1, help="How many built-in tr
 @app.command()
 def curves(
     folder: Folder = None,
-    up: Annotated[str, typer.Option("--up", help="Axis of a folder's trees that points up: x, y or z.")] = "z",
+    up: Annotated[Literal["x", "y", "z"], typer.Option("--up", help="Axis of a folder's trees that points up.")] = "z",
     trees: Trees = 5,
     tool: Annotated[str, typer.Option("--tool", metavar="NAMES", help="With commas; else all installed.")] = "",
     limit: Annotated[float, typer.Option("--limit", help="Seconds for a skeleton, imports included.")] = 120.0,
@@ -40,7 +40,8 @@ def curves(
     if not found:
         raise typer.BadParameter(f"there is no NAME.npz in {folder}")
     one_thread()
-    work = [(dict(tool=name, **it.facts), (it, peer)) for (name, peer), it in product(tools.items(), found)]
+    pairs = product(tools.items(), found)
+    work = [(dict(tool=name, condition=it[1], tree=it[0]), (it, peer)) for (name, peer), it in pairs]
     rows = run(forest.measure_curve, work, jobs, fresh=True, limit=limit)
     publish(rows, forest.curve_tables, output, page, "trees of a folder" if folder else "trees")
 
