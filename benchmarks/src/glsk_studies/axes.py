@@ -92,7 +92,7 @@ def difference_tables(pairs: list[dict]) -> Tables:
     for variant, group in with_all(grouped(random_shapes(pairs), "variant")).items():
         for label, here in grouped(group, "pipeline").items():
             rows, cells = [pair["rows"] for pair in here], []
-            for name, digits in (("topology", 2), ("perfect", 2), ("error", 3)):
+            for name, digits in COMPARED.items():
                 means, difference = change(rows, name, digits)
                 cells += [(means and " → ".join(number(mean, digits) for mean in means)) or "-", difference]
             names = []

@@ -74,13 +74,13 @@ def keep_scores(results: Results, made: Mapping[str, Any]) -> Path:
     hours = round(sum(row["seconds"] or 0 for row in rows) / 3600, 2)
     told = {"benchmark": results.benchmark, "name": results.name, "whole": results.whole, "clouds": rows}
     path = kept_file(results.benchmark, f"{results.name}.json.gz")
+    path.parent.mkdir(exist_ok=True)
     write_packed(path, {**told, "made": {**made, "hours": hours}})
     return path
 
 
 def kept_file(version: str, name: str) -> Path:
     """The path of what is kept of a version of the benchmark."""
-    (KEPT / version).mkdir(exist_ok=True)
     return KEPT / version / name
 
 
@@ -98,7 +98,9 @@ def kept(version: str) -> list[Entry]:
 
 def keep_seconds(version: str, found: Seconds) -> None:
     """Keep the median CPU seconds `cpu` of some tools, and `where` they were measured, beside those of others."""
-    write_json(kept_file(version, "seconds.json"), seconds(version) | found)
+    path = kept_file(version, "seconds.json")
+    path.parent.mkdir(exist_ok=True)
+    write_json(path, seconds(version) | found)
 
 
 def seconds(version: str) -> Seconds:
@@ -112,6 +114,7 @@ def keep_repeat(version: str, objects: str, found: Repeat, made: Mapping[str, An
     path, before = kept_file(version, name), read_kept(version, name)
     if any(each["benchmark"] != found.benchmark for tool, each in before.items() if tool != found.name):
         raise typer.BadParameter(f"{path} has other clouds: remove it, and run all tools anew")
+    path.parent.mkdir(exist_ok=True)
     write_packed(path, before | {found.name: {**found.as_dict(), "made": dict(made)}})
     return path
 
