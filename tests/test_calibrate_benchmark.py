@@ -50,22 +50,21 @@ class TestLabels:
         assert sorted(asked) == sorted((it.about, it.probability) for it in pipeline(cloud.points).report.decisions)
 
 
-def answered(n=6000):
+def asked(n=6000):
     """Questions whose answers are drawn with the probabilities of a logistic model."""
     rng = np.random.default_rng(0)
     facts = rng.normal(size=(n, 2))
     is_so = rng.random(n) < expit(facts @ [2, -1] - 0.5)
-    shapes, families = ((np.arange(n) % several).astype(str) for several in (50, 3))
-    return calibrate.Answered(["one", "other"], facts, is_so, shapes, families)
+    return [dict(facts=dict(one=a, other=b), is_so=so) for (a, b), so in zip(facts.tolist(), is_so, strict=True)]
 
 
 class TestArithmetic:
     def test_the_weights_that_made_the_answers_are_found(self):
-        weights = calibrate.fitted(answered())
+        weights = calibrate.fitted(asked())
         np.testing.assert_allclose([*weights.values()], [-0.5, 2, -1], atol=0.15)
         assert [*weights] == ["constant", "one", "other"]
-        plain = answered(200)  # an answer that one fact gives away has finite weights
-        assert 2 < calibrate.fitted(plain._replace(is_so=plain.facts[:, 0] > 0))["one"] < 20
+        plain = [it | dict(is_so=it["facts"]["one"] > 0) for it in asked(200)]
+        assert 2 < calibrate.fitted(plain)["one"] < 20  # an answer that one fact gives away has finite weights
 
     def test_loss_and_area_in_closed_form(self):
         is_so = np.array([True, True, False, False])
@@ -91,7 +90,7 @@ class TestCommands:
 
         page.write_text("<!-- check -->\n<!-- end -->\n<!-- transfer -->\n<!-- end -->\n")
         (tmp_path / "images").mkdir()
-        told = call("check", saved, "--markdown", "--page", page)
+        told = call("check", saved, "--page", page)
         assert told.count("| a branch is a limb |") == 3
         assert page.read_text().count("| a branch is a limb |") == 3
         assert (tmp_path / "images" / "probabilities.png").read_bytes().startswith(b"\x89PNG")

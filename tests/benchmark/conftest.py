@@ -25,3 +25,13 @@ def fingerprint():
         return found.hexdigest()[:16]
 
     return take
+
+
+@pytest.fixture(scope="session")
+def everything():
+    """The bytes of all files of a folder, by their names in it."""
+
+    def read(folder):
+        return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+    return read

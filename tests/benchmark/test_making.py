@@ -15,11 +15,7 @@ from glsk_o3d.errors import FileFormatError, InvalidParameterError
 CHOICE = dict(families=["tubes", "trees"], seeds=[100, 101], variants=["clean", "scan2"], jobs=1)
 
 
-def everything(folder):
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-
-
-def test_what_is_in_the_folder(small):
+def test_what_is_in_the_folder(small, everything):
     shapes = ["trees_100", "trees_101", "tubes_100", "tubes_101"]
     clouds = [f"clouds/{shape}_{variant}.ply" for shape in shapes for variant in ("clean", "scan2")]
     assert sorted(everything(small.path)) == [INDEX_NAME, *clouds, *(f"truth/{shape}.npz" for shape in shapes)]
@@ -36,7 +32,7 @@ def test_what_is_in_the_folder(small):
     assert (again.version, again.shapes, again.complete) == ("v1", small.shapes, True)
 
 
-def test_an_interrupted_one_goes_on(small, rods, tmp_path):
+def test_an_interrupted_one_goes_on(small, rods, everything, tmp_path):
     expected = everything(small.path)
     rods.clear()
 
@@ -57,7 +53,7 @@ def test_an_interrupted_one_goes_on(small, rods, tmp_path):
 
 
 @pytest.mark.parametrize("lost", ["clouds/tubes_100_scan2.ply", "truth/tubes_100.npz"])
-def test_what_is_lost_is_made_again(small, rods, lost):
+def test_what_is_lost_is_made_again(small, rods, everything, lost):
     before = everything(small.path)
     (small.path / lost).unlink()
     rods.clear()
@@ -137,7 +133,7 @@ def test_an_index_leads_nowhere_else(small, part, name):
         read_folder(small.path)
 
 
-def test_in_two_processes_it_is_the_same_and_what_is_known(tmp_path):
+def test_in_two_processes_it_is_the_same_and_what_is_known(everything, tmp_path):
     pytest.importorskip("glsk_bench.shapes")  # what is drawn, not the rods of the other tests
     choice = dict(families=["tubes", "handles"], seeds=[100], variants=["noise1", "depth2"])
     alone, together = (make(tmp_path / str(jobs), **choice, jobs=jobs) for jobs in (1, 2))

@@ -24,12 +24,8 @@ def own(tmp_path):
     return add_shape(tmp_path / "own", "a.fork", clouds, *AXIS, family="forks")
 
 
-def everything(folder):
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-
-
 class TestFolder:
-    def test_what_is_in_it(self, own):
+    def test_what_is_in_it(self, own, everything):
         clouds = ["a.fork_late", "a.fork_early", "zig_scan"]  # variants as they were added
         files = [INDEX_NAME, *(f"clouds/{name}.ply" for name in clouds), "truth/a.fork.npz", "truth/zig.npz"]
         assert sorted(everything(own.path)) == sorted(files)
@@ -72,7 +68,7 @@ class TestRefusals:
         with pytest.raises(InvalidParameterError, match=said):
             add_shape(own.path, shape, {variant: FORK.points}, *AXIS)
 
-    def test_other_points_or_another_axis(self, own):
+    def test_other_points_or_another_axis(self, own, everything):
         before = everything(own.path)
         with pytest.raises(InvalidParameterError, match=r"other points for a\.fork_late"):
             add_shape(own.path, "a.fork", {"late": FORK.points[1::2]}, *AXIS)

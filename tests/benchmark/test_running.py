@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 import pytest
-from glsk_bench import run, score_answers
+from glsk_bench import make, run, score_answers
 from glsk_bench.running import CAN_LIMIT_MEMORY, RunResult
 
 from glsk_o3d import pipelines, read_cloud, read_skeleton
@@ -158,10 +158,6 @@ def test_wrong_words(small, tmp_path, options, said):
 
 
 def test_our_pipelines_run_as_commands(rods, tmp_path):
-    from glsk_bench import make
-
-    from glsk_o3d import read_cloud
-
     made = make(tmp_path / "bench", families=["tubes"], seeds=[100], variants=["clean"], jobs=1)
     assert run(made, tmp_path / "ours", pipeline="default") == RunResult(1, 0, 0, {})
     found = read_skeleton(tmp_path / "ours" / "tubes_100_clean.ply")

@@ -6,7 +6,7 @@ from glsk_bench.shapes import FAMILIES
 from glsk_bench.shapes.curves import generator
 from glsk_bench.shapes.surface import INSIDE, surface
 
-from glsk_o3d.samples.capsules import capsule_distance, signed_distance
+from glsk_o3d.samples.capsules import signed_distance
 
 
 @pytest.mark.parametrize("family", FAMILIES["v1"])
@@ -23,16 +23,6 @@ def test_all_points_are_on_the_surface_and_normals_point_outward(family, seed, d
     assert signed_distance(points - 1e-4 * normals, *axis).max() < -0.99e-4
     outside = signed_distance(points + 1e-4 * normals, *axis)
     assert np.mean(outside > 0.9e-4) > 0.97  # but in creases
-
-
-@pytest.mark.parametrize("radii", [(0.3, 0.3), (0.05, 0.2), (1.5, 0.2)])
-def test_the_distance_is_that_of_the_nearest_ball_between(radii):
-    a, b = np.array([0.1, -0.2, 0.3]), np.array([0.7, 0.5, -0.1])
-    points = np.random.default_rng(0).uniform(-2, 2, (500, 3))
-    t = np.linspace(0, 1, 20001)[:, None]
-    balls, sizes = a + t * (b - a), radii[0] + t[:, 0] * (radii[1] - radii[0])
-    nearest = [(np.linalg.norm(balls - point, axis=1) - sizes).min() for point in points]
-    np.testing.assert_allclose(capsule_distance(points, a, b, *radii), nearest, atol=1e-6)
 
 
 def cone(ra, rb, pieces=1):

@@ -97,14 +97,6 @@ def test_of_a_share_is_binomial(right, of):
     np.testing.assert_allclose(ends, stats.binom.ppf([0.025, 0.975], of, mean) / of, atol=1.001 / of)
 
 
-def test_is_that_of_scipy():
-    values = np.random.default_rng(3).gamma(1.5, size=40)
-    found = mean_with_interval([*map(str, range(40))], values)
-    options = dict(method="percentile", n_resamples=20_000, rng=np.random.default_rng(4))
-    expected = stats.bootstrap((values,), np.mean, **options).confidence_interval
-    np.testing.assert_allclose(found, [values.mean(), *expected], atol=0.04)
-
-
 def test_more_clouds_of_a_shape_are_no_more_evidence():
     shapes, values = [*map(str, range(30))], np.random.default_rng(5).random(30)
     once = mean_with_interval(shapes, values)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -74,11 +75,8 @@ def make(
             **{"scored": len(made.scored), "whole": made.whole},
             "sameness": sameness,
         }
-        if as_json:
-            print_json(told)
-        elif not quiet:
-            words = ", ".join(f"{count} {kind}" for kind, count in sameness.items() if count)
-            print_rows({**told, "whole": "yes" if made.whole else "no", "sameness": words or None})
+        words = ", ".join(f"{count} {kind}" for kind, count in sameness.items() if count)
+        _tell(told, {**told, "whole": "yes" if made.whole else "no", "sameness": words or None}, as_json, quiet)
         if same.count("other") and not quiet:
             say("warning", f"{same.count('other')} clouds are not those that {made.version} means: see benchmark.json")
         lacking = ((shape, variant) for shape, each in made.shapes.items() for variant in each.get("not_made", {}))
@@ -141,10 +139,7 @@ def run(
                 on_cloud=step,
             )
         told = {"answers": str(answers), "done": result.done, "failed": result.failed, "skipped": result.skipped}
-        if as_json:
-            print_json({**told, "failures": result.failures})
-        elif not quiet:
-            print_rows(told)
+        _tell({**told, "failures": result.failures}, told, as_json, quiet)
 
 
 @app.command()
@@ -171,12 +166,9 @@ def score(
             results = score_answers(folder, answers, name=name, on_cloud=update)
         results.save(output)
         found = leaderboard([results]).entries[0]["all"]
-        if as_json:
-            print_json({"name": results.name, **found, "files": [str(output)]})
-        elif not quiet:
-            means = {measure: told[0] for measure, told in found.items() if isinstance(told, list)}
-            print_rows({"name": results.name, "clouds": found["clouds"], "failures": found["failures"], **means})
-            echo(f"wrote {output}")
+        means = {measure: told[0] for measure, told in found.items() if isinstance(told, list)}
+        rows = {"name": results.name, "clouds": found["clouds"], "failures": found["failures"], **means}
+        _tell({"name": results.name, **found, "files": [str(output)]}, rows, as_json, quiet, [output])
 
 
 @app.command()
@@ -202,10 +194,7 @@ def sample(
             options: dict[str, Any] = {"version": version, "draws": draws, "n": points, "noise": noise}
             made = sample_objects(folder, meshes, **options, on_object=update)
         told = {"folder": str(folder), "objects": len(made.shapes), "clouds": len(made.clouds)}
-        if as_json:
-            print_json(told)
-        elif not quiet:
-            print_rows(told)
+        _tell(told, told, as_json, quiet)
 
 
 @app.command()
@@ -236,12 +225,8 @@ def repeat(
             found = compare_answers(folder, answers, name=name, on_object=update)
         for path in files:
             found.save(path)
-        if as_json:
-            print_json({**found.as_dict(), "files": [str(path) for path in files]})
-        elif not quiet:
-            echo(found.markdown().rstrip())
-            for path in files:
-                echo(f"wrote {path}")
+        names = [str(path) for path in files]
+        _tell({**found.as_dict(), "files": names}, found.markdown().rstrip(), as_json, quiet, files)
 
 
 @app.command()
@@ -269,13 +254,23 @@ def table(
         board = leaderboard(map(read_results, scores))
         for path in files:
             board.save(path)
-        if as_json:
-            print_json({**board.as_dict(), "files": [str(path) for path in files]})
-        elif files and not quiet:
-            for path in files:
-                echo(f"wrote {path}")
-        elif not quiet:
-            echo(board.markdown().rstrip())
+        text = "" if files else board.markdown().rstrip()
+        _tell({**board.as_dict(), "files": [str(path) for path in files]}, text, as_json, quiet, files)
+
+
+def _tell(
+    told: dict[str, Any], shown: dict[str, Any] | str, as_json: bool, quiet: bool, files: Sequence[Path] = ()
+) -> None:
+    """Print what is told as JSON, or what is shown of it, as rows or a text, and the files that were written."""
+    if as_json:
+        print_json(told)
+    elif not quiet:
+        if isinstance(shown, dict):
+            print_rows(shown)
+        elif shown:
+            echo(shown)
+        for path in files:
+            echo(f"wrote {path}")
 
 
 def _words(texts: list[str] | None) -> list[str] | None:

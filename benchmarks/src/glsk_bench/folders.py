@@ -6,7 +6,6 @@ import json
 import os
 import zlib
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ import numpy as np
 from glsk_o3d.analysis.comparison import Truth
 from glsk_o3d.errors import FileFormatError, InvalidParameterError
 from glsk_o3d.interop.atomic import write_atomically, write_json
-from glsk_o3d.io.formats.ply import header_of, rows_of
+from glsk_o3d.io.formats import ply
 
 from .truths import THING_ARRAYS, read_axis
 from .versions import OWN, VERSIONS
@@ -246,5 +245,4 @@ def write_axis(path: Path, axis: Any) -> None:
 
 def write_points(path: Path, points: np.ndarray) -> None:
     """Write a cloud, (n, 3) float32 or float64 array."""
-    rows = rows_of(dict(zip("xyz", points.T, strict=True)))
-    write_atomically(path, partial(Path.write_bytes, data=header_of(rows.dtype, len(rows)) + rows.tobytes()))
+    ply.save(path, {"positions": points})

@@ -190,19 +190,8 @@ class Repeat:
         -------
         str
         """
-        heads = [
-            "object",
-            "moved",
-            "near ends",
-            "near junctions",
-            "elsewhere",
-            "limbs",
-            "agree",
-            "right loops",
-            "right ends",
-            "hooks",
-            "failures",
-        ]
+        heads = ["object", "moved", "near ends", "near junctions", "elsewhere", "limbs"]
+        heads += ["agree", "right loops", "right ends", "hooks", "failures"]
         lines = []
         for row in self.rows:
             hooks = f"{row['hooks']} of {row['tips']}"

@@ -25,7 +25,6 @@ from .runs import (
     File,
     Folders,
     Jobs,
-    Markdown,
     Output,
     Own,
     Pipelines,
@@ -36,10 +35,9 @@ from .runs import (
     named,
     publish,
     run,
-    study,
     with_solves,
 )
-from .tables import ROOT, fill, markdown_table, present, read, write_packed
+from .tables import ROOT, fill, markdown, present, read, write_packed
 
 EVERY = "clean_1024,clean_4096,density_4096,holes_4096,scan2_4096,noise1_4096,noise2_4096,outliers_4096"
 SOLVES = range(7)
@@ -65,7 +63,7 @@ def altered(pipeline: Pipeline, settings: list[str] | None) -> Pipeline:
         raise typer.BadParameter(str(error)) from None
 
 
-@study(app, lambda rows: axes.overview(rows) + axes.details(rows))
+@app.command()
 def truth(
     folders: Folders = None,
     own: Own = False,
@@ -76,19 +74,20 @@ def truth(
     draws: Annotated[int, typer.Option(min=1, help="Clouds of each built-in shape and variant.")] = 1,
     repeat: Annotated[int, typer.Option(min=1, help="Runs, of whose CPU seconds the median counts.")] = 1,
     jobs: Jobs = 2,
-) -> list[dict]:
-    """Pipelines on shapes with known axes: by kind of cloud, by family of shapes, and what is bad."""
+    output: Output = None,
+) -> None:
+    """Pipelines on shapes with known axes: by kind of cloud, and by family of shapes."""
     chosen = {name: altered(it, changed) for name, it in named(pipeline).items()}
-    return axes.measured(cases(folders, own, variant, shapes, draws), chosen, jobs, repeat)
+    publish(axes.measured(cases(folders, own, variant, shapes, draws), chosen, jobs, repeat), axes.overview, output)
 
 
 @app.command()
-def compare(before: Saved, after: Saved, markdown: Markdown = False) -> None:
+def compare(before: Saved, after: Saved) -> None:
     """What has changed from one result of truth to another, cloud by cloud."""
     pairs = axes.paired(*(read(path)["rows"] for path in (before, after)))
     if not pairs:
         raise typer.BadParameter(f"{before} and {after} have no cloud and pipeline in common")
-    present(axes.difference_tables(pairs), markdown)
+    present(axes.difference_tables(pairs))
 
 
 @app.command()
@@ -104,7 +103,6 @@ def ablation(
     ] = None,
     jobs: Jobs = 2,
     output: Output = None,
-    markdown: Markdown = False,
 ) -> None:
     """The default pipeline with each idea switched off, one at a time: mean error / shapes with right topology."""
     if unknown := set(idea.split(",")) - set(ideas.IDEAS):
@@ -113,37 +111,40 @@ def ablation(
     chosen |= {name: override(default(), ideas.IDEAS[name].split()) for name in idea.split(",")}
     chosen |= named(",".join(PUBLISHED))
     rows = axes.measured(cases(folders, own, variant, shapes), chosen, jobs)
-    publish(rows, ideas.ablation_tables, output, markdown)
+    publish(rows, ideas.ablation_tables, output)
     if page is not None:
         ideas.write_effects(page, rows)
 
 
-@study(app, stability.stop_tables)
+@app.command()
 def stop(
     folders: Folders = None,
     own: Own = False,
     variant: Variants = "clean_4096,noise2_4096",
     shapes: Shapes = "",
     jobs: Jobs = 2,
-) -> list[dict]:
+    output: Output = None,
+) -> None:
     """Where the stop rule stops, and what more or fewer solves would give."""
     chosen = {str(n): with_solves(default(), n) for n in SOLVES} | {"rule": default()}
-    return axes.measured(cases(folders, own, variant, shapes), chosen, jobs)
+    publish(axes.measured(cases(folders, own, variant, shapes), chosen, jobs), stability.stop_tables, output)
 
 
-@study(app, stability.mass_tables)
+@app.command()
 def mass(
     folders: Folders = None,
     own: Own = False,
     variant: Variants = "clean_4096",
     shapes: Shapes = "",
     jobs: Jobs = 2,
-) -> list[dict]:
+    output: Output = None,
+) -> None:
     """How well the reduced contraction tracks the full one, with the mass of merged points and without."""
-    return run(stability.tracking, [(it.facts, (it,)) for it in cases(folders, own, variant, shapes)], jobs)
+    rows = run(stability.tracking, [(it.facts, (it,)) for it in cases(folders, own, variant, shapes)], jobs)
+    publish(rows, stability.mass_tables, output)
 
 
-@study(app, stability.turn_tables)
+@app.command()
 def rotations(
     folders: Folders = None,
     own: Own = False,
@@ -152,11 +153,12 @@ def rotations(
     count: Annotated[int, typer.Option(min=1, help="Turns per shape.")] = 20,
     changed: Changed = None,
     jobs: Jobs = 2,
-) -> list[dict]:
+    output: Output = None,
+) -> None:
     """Whether the skeleton depends on how the cloud is turned and in which order its points come."""
     pipeline = altered(default(), changed)
     work = [(it.facts, (it, count, pipeline)) for it in cases(folders, own, variant, shapes)]
-    return run(stability.turned, work, jobs)
+    publish(run(stability.turned, work, jobs), stability.turn_tables, output)
 
 
 @app.command()
@@ -192,5 +194,4 @@ def worth(
 def worth_text() -> str:
     """The table of what is kept, and the commit that it is of."""
     kept = read(WORTH_KEPT)
-    tables = "\n".join(markdown_table(*table) for table in ideas.worth_tables(kept["rows"]))
-    return f"Measured with commit {kept['commit']}.\n\n{tables}"
+    return f"Measured with commit {kept['commit']}.\n\n{markdown(ideas.worth_tables(kept['rows']))}"

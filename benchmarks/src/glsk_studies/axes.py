@@ -16,7 +16,7 @@ from glsk_o3d.analysis import compare
 
 from .clouds import Case
 from .runs import run
-from .tables import Tables, good, grouped, keep, look, number, pick, sheet, summary
+from .tables import Tables, grouped, keep, look, number, pick, sheet, summary
 
 MEASURES = {"tips_f1": "tips F1", "junctions_f1": "junctions F1", "length": "length"}
 CLOUD = ("pipeline", "variant", "shape", "draw")  # what one row of a result is of
@@ -77,31 +77,6 @@ def overview(rows: list[dict]) -> Tables:
     return tables
 
 
-def details(rows: list[dict]) -> Tables:
-    """The other measures, a table per variant, with the names of what is bad."""
-    header = ["", "inside", "complete", "ends", "radius", "worst", "wrong"]
-    tables = []
-    for variant, group in grouped(rows, "variant").items():
-        lines = []
-        for label, here in grouped(group, "pipeline").items():
-            mean = summary(here)
-            last = sorted(good(here), key=lambda row: -row["error"])[:3]
-            numbers = [number(mean[key]) for key in ("inside", "completeness")]
-            numbers += [number(mean[key], 2) for key in ("ends", "radius_error")]
-            worst = ", ".join(f"{row['shape']} {row['error']:.2f}" for row in last)
-            lines.append([label, *numbers, worst, ", ".join(filter(None, map(wrong, here)))])
-        tables.append((variant, header, lines))
-    return tables
-
-
-def wrong(row: dict) -> str:
-    """What is wrong with the topology of a row: nothing, loops and components too many or too few, or everything."""
-    if "failure" in row:
-        return f"{row['shape']} ({row['failure']})"
-    off = [f"{row[name]:+d} {name}" for name in ("loops", "components") if row[name]]
-    return f"{row['shape']} {' '.join(off)}" if off else ""
-
-
 def paired(before: list[dict], after: list[dict]) -> list[dict]:
     """The clouds that both results have, with both rows; how many only one has is said."""
     earlier, later = ({tuple(row[name] for name in CLOUD): row for row in rows} for rows in (before, after))
@@ -117,7 +92,7 @@ def difference_tables(pairs: list[dict]) -> Tables:
     for variant, group in with_all(grouped(random_shapes(pairs), "variant")).items():
         for label, here in grouped(group, "pipeline").items():
             rows, cells = [pair["rows"] for pair in here], []
-            for name, digits in (("topology", 2), ("perfect", 2), ("error", 3)):
+            for name, digits in COMPARED.items():
                 means, difference = change(rows, name, digits)
                 cells += [(means and " → ".join(number(mean, digits) for mean in means)) or "-", difference]
             names = []

@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -24,21 +25,15 @@ import typer
 from glsk_o3d import samples
 from glsk_o3d.io.formats import ply
 
-from .runs import Markdown, Output
-from .tables import number, present, save
+from .runs import Output, application
+from .tables import Table, fixed, number, present, save, table
 
 SHAPES = (
     *(samples.tube, samples.torus, samples.y_junction, samples.two_rings, samples.helix),
     partial(samples.sauropod, cameras=None),
 )
 CORRUPT = ("empty.ply", "truncated.ply", "garbage.xyz", "nan.ply", "a_ply.pcd")
-app = typer.Typer(add_completion=False)
-
-
-def write_ply(path: Path, points) -> None:
-    """Write points as binary PLY."""
-    rows = ply.rows_of(dict(zip("xyz", np.asarray(points, float).T, strict=True)))
-    path.write_bytes(ply.header_of(rows.dtype, len(rows)) + rows.tobytes())
+app = application(None)
 
 
 def make_scans(folder: Path, count: int, smallest: int, largest: int) -> None:
@@ -46,15 +41,16 @@ def make_scans(folder: Path, count: int, smallest: int, largest: int) -> None:
     rng = np.random.default_rng(0)
     for i in range(count):
         n = int(smallest * (largest / smallest) ** rng.random())
-        write_ply(folder / f"{i:04}.ply", SHAPES[i % len(SHAPES)](n, noise=0.002 * (i % 3), seed=i).points)
+        cloud = SHAPES[i % len(SHAPES)](n, noise=0.002 * (i % 3), seed=i).points
+        ply.save(folder / f"{i:04}.ply", {"positions": cloud})
     whole = samples.torus(1024).points
     empty, cut, garbage, nan, other = (folder / f"{count * i // 6:04}_{name}" for i, name in enumerate(CORRUPT, 1))
     empty.touch()
-    write_ply(cut, whole)
+    ply.save(cut, {"positions": whole})
     cut.write_bytes(cut.read_bytes()[:-5000])
     garbage.write_text("this is no cloud\n" * 100)
-    write_ply(nan, np.full_like(whole, np.nan))
-    write_ply(other, whole)
+    ply.save(nan, {"positions": np.full_like(whole, np.nan)})
+    ply.save(other, {"positions": whole})
 
 
 def command(scans: Path, out: Path, *words: str) -> list[str]:
@@ -115,33 +111,30 @@ def measured(scans: Path, folder: Path, workers: int) -> list[dict]:
     return rows
 
 
+def facts_table(title: str, facts: Mapping[str, object]) -> Table:
+    """A line for each fact."""
+    cells = [[name, number(it, 4) if isinstance(it, float) else str(it)] for name, it in facts.items()]
+    return title, ["", "note"], cells
+
+
 @app.command()
 def main(
     count: Annotated[int, typer.Option("--count", min=10, help="Clouds, besides the five corrupt ones.")] = 495,
-    smallest: Annotated[int, typer.Option("--smallest", min=256, help="Points.")] = 1024,
-    largest: Annotated[int, typer.Option("--largest", min=256, help="Points.")] = 8192,
-    workers: Annotated[str, typer.Option("--workers", metavar="NUMBERS", help="With commas.")] = "1,2",
-    markdown: Markdown = False,
+    largest: Annotated[int, typer.Option("--largest", min=1024, help="Points; the smallest have 1024.")] = 8192,
     output: Output = None,
 ) -> None:
     """Measure the rate of batches, and kill a worker in the midst of one."""
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        scans = folder / "scans"
+        folder, scans = Path(name), Path(name, "scans")
         scans.mkdir()
-        make_scans(scans, count, smallest, largest)
-        each = [int(word) for word in workers.split(",")]
-        rows = [row for n in each for row in measured(scans, folder, n)]
+        make_scans(scans, count, 1024, largest)
+        rows = [row for workers in (1, 2) for row in measured(scans, folder, workers)]
         killed = kill_one(scans, folder / "killed", count // 4)
-        failures = [row for row in ledger(folder / f"local{each[0]}") if row["status"] == "failed"]
-    title = f"{count} clouds of {smallest} to {largest} points and 5 corrupt ones, {os.cpu_count()} cores"
-    header = ["run", "workers", "done", "skipped", "failed", "seconds", "CPU s", "clouds/s", "load before"]
-    lines = []
-    for row in rows:
-        values = [number(row[key], 1) for key in ("wall", "cpu", "clouds_per_second", "load")]
-        lines.append([row["run"], *(str(row[key]) for key in ("workers", "done", "skipped", "failed")), *values])
-    reasons = [[Path(row["input"]).name, row["error"]] for row in failures]
-    facts = [[key, str(value)] for key, value in killed.items()]
-    tables = [(title, header, lines), ("What failed", ["input", "note"], reasons)]
-    present([*tables, ("One of two workers killed", ["", "note"], facts)], markdown)
+        failed = [row for row in ledger(folder / "local1") if row["status"] == "failed"]
+    title = f"{count} clouds of 1024 to {largest} points and 5 corrupt ones, {os.cpu_count()} cores"
+    columns = {name: name for name in ("run", "workers", "done", "skipped", "failed")}
+    columns |= {"seconds": fixed("wall", 1), "CPU s": fixed("cpu", 1), "clouds/s": fixed("clouds_per_second", 1)}
+    reasons = {Path(row["input"]).name: row["error"] for row in failed}
+    tables = [table(title, rows, {**columns, "load before": fixed("load", 1)}, note=False)]
+    present([*tables, facts_table("What failed", reasons), facts_table("One of two workers killed", killed)])
     save(output, [*rows, {"run": "one of two workers killed", **killed}])

@@ -22,7 +22,7 @@ from glsk_o3d.interop.clouds import cloud_points
 from glsk_o3d.recipes.catalogue import named_pipeline
 
 from .peers import PEERS, skeleton_of
-from .tables import BLUE, ORANGE, ROOT, Table, keep, number, read, save_figure, sheet, write_packed
+from .tables import BLUE, ORANGE, ROOT, Table, grouped, keep, number, read, save_figure, sheet, write_packed
 
 KEPT = ROOT / "benchmarks"  # a folder of it for each version of the benchmark
 DECIMALS = 4  # of what is kept, far more than intervals are wide
@@ -73,48 +73,55 @@ def keep_scores(results: Results, made: Mapping[str, Any]) -> Path:
     ]
     hours = round(sum(row["seconds"] or 0 for row in rows) / 3600, 2)
     told = {"benchmark": results.benchmark, "name": results.name, "whole": results.whole, "clouds": rows}
-    path = kept_in(results.benchmark) / f"{results.name}.json.gz"
+    path = kept_file(results.benchmark, f"{results.name}.json.gz")
+    path.parent.mkdir(exist_ok=True)
     write_packed(path, {**told, "made": {**made, "hours": hours}})
     return path
 
 
-def kept_in(version: str) -> Path:
-    """The folder of what is kept of a version of the benchmark."""
-    (KEPT / version).mkdir(exist_ok=True)
-    return KEPT / version
+def kept_file(version: str, name: str) -> Path:
+    """The path of what is kept of a version of the benchmark."""
+    return KEPT / version / name
+
+
+def read_kept(version: str, name: str) -> dict[str, Any]:
+    """What is kept there, or nothing."""
+    path = kept_file(version, name)
+    return read(path) if path.is_file() else {}
 
 
 def kept(version: str) -> list[Entry]:
     """All scores that are kept, in the order of the tools."""
-    paths = {name: KEPT / version / f"{name}.json.gz" for name in PEERS}
-    return [Entry(read_results(path), read(path)["made"]) for path in paths.values() if path.is_file()]
+    paths = [kept_file(version, f"{name}.json.gz") for name in PEERS]
+    return [Entry(read_results(path), read(path)["made"]) for path in paths if path.is_file()]
 
 
 def keep_seconds(version: str, found: Seconds) -> None:
     """Keep the median CPU seconds `cpu` of some tools, and `where` they were measured, beside those of others."""
-    write_json(kept_in(version) / "seconds.json", seconds(version) | found)
+    path = kept_file(version, "seconds.json")
+    path.parent.mkdir(exist_ok=True)
+    write_json(path, seconds(version) | found)
 
 
 def seconds(version: str) -> Seconds:
     """What `keep_seconds` has kept."""
-    path = KEPT / version / "seconds.json"
-    return read(path) if path.is_file() else {}
+    return read_kept(version, "seconds.json")
 
 
 def keep_repeat(version: str, objects: str, found: Repeat, made: Mapping[str, Any]) -> Path:
     """Keep how far a tool's answers to several clouds of each object are apart, beside those of others."""
-    path = kept_in(version) / f"repeat_{objects}.json.gz"
-    before = read(path) if path.is_file() else {}
-    if any(each["benchmark"] != found.benchmark for name, each in before.items() if name != found.name):
+    name = f"repeat_{objects}.json.gz"
+    path, before = kept_file(version, name), read_kept(version, name)
+    if any(each["benchmark"] != found.benchmark for tool, each in before.items() if tool != found.name):
         raise typer.BadParameter(f"{path} has other clouds: remove it, and run all tools anew")
+    path.parent.mkdir(exist_ok=True)
     write_packed(path, before | {found.name: {**found.as_dict(), "made": dict(made)}})
     return path
 
 
 def repeats(version: str, objects: str) -> list[Repeat]:
     """What `keep_repeat` has kept, in the order of the tools."""
-    path = KEPT / version / f"repeat_{objects}.json.gz"
-    found = read(path) if path.is_file() else {}
+    found = read_kept(version, f"repeat_{objects}.json.gz")
     return [Repeat(found[name]["benchmark"], name, found[name]["objects"]) for name in PEERS if name in found]
 
 
@@ -232,30 +239,27 @@ def unclear(found: Sequence[Worse]) -> Table:
     return "where only the mean of `default` is worse", ["measure", "to", "which"], lines
 
 
+def interval(rows: Sequence[dict[str, Any]], measure: str, digits: int = 2, of: str = "shape") -> str:
+    """The mean of a measure over the rows that have it, with its interval from drawing shapes or objects anew."""
+    known = [row for row in rows if row[measure] is not None]
+    return told(*mean_with_interval([row[of] for row in known], [row[measure] for row in known]), digits)
+
+
 def by_group(entries: Sequence[Entry], group: str, measure: str, digits: int, title: str) -> Table:
     """The mean of a measure for each tool, by variant or by family, with intervals."""
-    rows = entries[0].results.rows
-    names = list(dict.fromkeys(row[group] for row in rows))
-    sizes = Counter(row[group] for row in rows)
+    sizes = Counter(row[group] for row in entries[0].results.rows)
     lines = []
     for entry in entries:
-        cells = []
-        for name in names:
-            known = [row for row in entry.results.rows if row[group] == name and row[measure] is not None]
-            found = mean_with_interval([row["shape"] for row in known], [row[measure] for row in known])
-            cells.append(told(*found, digits))
-        lines.append([*_label(entry.tool), *cells])
-    return title, ["", "takes", *(f"{name} ({sizes[name]})" for name in names)], lines
+        groups = grouped(entry.results.rows, group)
+        lines.append([*_label(entry.tool), *(interval(groups[name], measure, digits) for name in sizes)])
+    return title, ["", "takes", *(f"{name} ({size})" for name, size in sizes.items())], lines
 
 
 def repeated(found: Sequence[Repeat]) -> Table:
     """How far the answers to several clouds of each object are apart, the nearest first."""
     lines = []
-    for means, it in sorted(((each.means(), each) for each in found), key=lambda both: _last(both[0]["moved"])):
-        shown = {name: [(row["object"], row[name]) for row in it.rows if row[name] is not None] for name in SPREAD}
-        cells = {
-            name: told(*mean_with_interval(*zip(*rows, strict=True))) if rows else "-" for name, rows in shown.items()
-        }
+    for it in sorted(found, key=lambda each: _last(each.means()["moved"])):
+        means, cells = it.means(), {name: interval(it.rows, name, of="object") for name in SPREAD}
         where = [number((means["where"] or {}).get(place), 2) for place in PLACES]
         moved = [cells["moved"], number(means["median"], 2), *where]
         rest = [*(cells[name] for name in ("agree", "loops", "ends")), number(means["hooks"], 2)]

@@ -10,14 +10,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 import typer
 from glsk_bench.table import mean_with_interval, told
 from scipy.optimize import minimize
 from scipy.special import expit
-from scipy.stats import rankdata
+from scipy.stats import mannwhitneyu
 
 from glsk_o3d.analysis import compare
 from glsk_o3d.data.decisions import logistic
@@ -26,11 +26,10 @@ from glsk_o3d.pipelines import default
 
 from .clouds import Case, cases
 from .questions import questions
-from .runs import Jobs, Markdown, Output, Own, Saved, Shapes, Variants, application, run, study
-from .tables import BLUE, GREY, Table, Tables, fill, keep, number, page_with, pick, present, read, save, sheet
+from .runs import Jobs, Output, Own, Page, Saved, Shapes, Variants, application, publish, run
+from .tables import BLUE, GREY, Tables, fill, grouped, keep, number, pick, present, read, save, sheet
 
 PENALTY = 1.0  # of half a weight's square, as if it were drawn from a normal distribution; the constant has none
-
 PARTS = 5  # of the range of probabilities, of the same width
 SURE = 1e-9  # a probability is taken to be as far from 0 and 1, or one mistake would make the loss infinite
 ASKED = {question.about: question for question in ORDER}
@@ -42,8 +41,10 @@ QUESTIONS = {
 }
 SEEN, UNSEEN = "all families", "the other families"  # to which weights are fitted
 MEASURES = ("topology", "perfect")
-Weights = dict[str, dict[str, float]]
 EVERY = "*_4096"
+Question = dict  # its `facts`, whether it `is_so`, and of which `shape` and `family` it is
+Weights = dict[str, dict[str, float]]
+Judged = Mapping[str, tuple[np.ndarray, list[Question]]]  # probabilities, (n,), by what the questions are about
 Sources = Annotated[
     list[Path] | None,
     typer.Argument(metavar="DIR|JSON", exists=True, help="Folders of shapes, or questions that -o has written."),
@@ -52,52 +53,48 @@ Sources = Annotated[
 app = application(__doc__)
 
 
-class Answered(NamedTuple):
-    """Questions of one kind: their facts, whether it is so, and of which shapes and families they are."""
-
-    names: list[str]
-    facts: np.ndarray
-    is_so: np.ndarray
-    shapes: np.ndarray
-    families: np.ndarray
-
-    def of(self, some: np.ndarray) -> Answered:
-        return Answered(self.names, *(each[some] for each in self[1:]))
-
-
-def by_question(rows: list[dict]) -> dict[str, Answered]:
+def by_question(rows: list[dict]) -> dict[str, list[Question]]:
     """The questions of all clouds, by what they are about."""
-    found: dict[str, list[tuple]] = {about: [] for about in QUESTIONS}
-    for row in rows:
-        for it in row.get("questions", ()):
-            found[it["about"]].append((it["facts"], it["is_so"], row["shape"], row["family"]))
-    told = {}
-    for about, each in found.items():
-        if each:
-            facts, is_so, shapes, families = zip(*each, strict=True)
-            names = list(facts[0])
-            table = np.array([[fact[name] for name in names] for fact in facts])
-            told[about] = Answered(names, table, np.array(is_so), np.array(shapes), np.array(families))
-    return told
+    asked = [it | dict(shape=row["shape"], family=row["family"]) for row in rows for it in row.get("questions", ())]
+    return {about: known for about in QUESTIONS if (known := pick(asked, about=about))}
 
 
-def fitted(answered: Answered) -> dict[str, float]:
-    """The weights with which the questions are answered best: least log loss, with a light L2 penalty."""
-    table = np.column_stack([np.ones(len(answered.facts)), answered.facts])
-    penalty = PENALTY * np.append(0, np.ones(len(answered.names)))
+def answers(asked: list[Question]) -> np.ndarray:
+    """Whether it is so, (n,) bool array."""
+    return np.array([it["is_so"] for it in asked], bool)
+
+
+def fitted(asked: list[Question]) -> dict[str, float]:
+    """The weights with which the questions are answered best."""
+    names = list(asked[0]["facts"])
+    facts = np.array([[it["facts"][name] for name in names] for it in asked])
+    weights = logistic_weights(facts, answers(asked), PENALTY)
+    return dict(zip(["constant", *names], weights.tolist(), strict=True))
+
+
+def logistic_weights(facts: np.ndarray, is_so: np.ndarray, penalty: float) -> np.ndarray:
+    """A constant and a weight for each fact, (1 + f,) float array: least log loss, with a light L2 penalty."""
+    table = np.column_stack([np.ones(len(facts)), facts])
+    penalties = penalty * np.append(0, np.ones(facts.shape[1]))
 
     def loss(weights):
         total = table @ weights
-        value = np.logaddexp(0, np.where(answered.is_so, -total, total)).sum() + penalty @ weights**2 / 2
-        return value, table.T @ (expit(total) - answered.is_so) + penalty * weights
+        value = np.logaddexp(0, np.where(is_so, -total, total)).sum() + penalties @ weights**2 / 2
+        return value, table.T @ (expit(total) - is_so) + penalties * weights
 
-    found = minimize(loss, np.zeros(table.shape[1]), jac=True, method="BFGS").x
-    return dict(zip(["constant", *answered.names], found.tolist(), strict=True))
+    return minimize(loss, np.zeros(table.shape[1]), jac=True, method="BFGS").x
 
 
-def said(weights: Mapping[str, float], answered: Answered) -> np.ndarray:
+def said(weights: Mapping[str, float], asked: list[Question]) -> np.ndarray:
     """Probabilities, (n,) float array."""
-    return np.array([logistic(weights, dict(zip(answered.names, it, strict=True))) for it in answered.facts])
+    return np.array([logistic(weights, it["facts"]) for it in asked])
+
+
+def said_by_others(asked: list[Question], learnt: list[Question]) -> np.ndarray:
+    """What weights say of each family that were fitted without it, to other questions, (n,) float array."""
+    families = {it["family"] for it in asked}
+    weights = {family: fitted([it for it in learnt if it["family"] != family]) for family in families}
+    return np.array([logistic(weights[it["family"]], it["facts"]) for it in asked])
 
 
 def log_loss(chance: np.ndarray, is_so: np.ndarray) -> float:
@@ -111,32 +108,33 @@ def area_under_curve(chance: np.ndarray, is_so: np.ndarray) -> float:
 
     NaN without such pairs.
     """
-    n, m = np.count_nonzero(is_so), np.count_nonzero(~is_so)
-    return (rankdata(chance)[is_so].sum() - n * (n + 1) / 2) / (n * m) if n and m else np.nan
+    if is_so.all() or not is_so.any():
+        return np.nan
+    return mannwhitneyu(chance[is_so], chance[~is_so]).statistic / (is_so.sum() * (~is_so).sum())
 
 
-def parts(chance: np.ndarray, answered: Answered) -> list[tuple[int, float, tuple[float, float, float]]]:
+def parts(chance: np.ndarray, asked: list[Question]) -> list[tuple[int, float, tuple[float, float, float]]]:
     """Of every part of the range that is not empty: the count, the mean probability, and how often it is so."""
-    part, found = np.minimum((chance * PARTS).astype(int), PARTS - 1), []
+    part, is_so, found = np.minimum((chance * PARTS).astype(int), PARTS - 1), answers(asked), []
     for k in np.unique(part):
-        here = part == k
-        often = mean_with_interval(answered.shapes[here].tolist(), answered.is_so[here].tolist())
-        found.append((int(here.sum()), float(chance[here].mean()), often))
+        rows = np.flatnonzero(part == k)
+        often = mean_with_interval([asked[i]["shape"] for i in rows], is_so[rows])
+        found.append((len(rows), float(chance[rows].mean()), often))
     return found
 
 
-def tables(told_of: Mapping[str, tuple[np.ndarray, Answered]]) -> Tables:
+def tables(judged: Judged) -> Tables:
     """A line for each kind of question; what is said and how often it is so, by parts of the range; and by family."""
     kinds, ranges, families = [], [], []
-    for about, (chance, answered) in told_of.items():
-        question, is_so = QUESTIONS[about], answered.is_so
-        asked, so, probability, *losses = _judged(chance, is_so)
-        kinds.append([question, asked, so, probability, number(((chance >= 0.5) == is_so).mean()), *losses])
-        for place, (count, mean, often) in enumerate(parts(chance, answered)):
-            ranges.append([question * (place == 0), str(count), number(mean, 2), told(*often)])
-        for place, family in enumerate(dict.fromkeys(answered.families.tolist())):
-            here = answered.families == family
-            families.append([question * (place == 0), family, *_judged(chance[here], is_so[here])])
+    for about, (chance, asked) in judged.items():
+        question, is_so = QUESTIONS[about], answers(asked)
+        count, so, probability, *losses = _cells(chance, is_so)
+        kinds.append([question, count, so, probability, number(((chance >= 0.5) == is_so).mean()), *losses])
+        for place, (n, mean, often) in enumerate(parts(chance, asked)):
+            ranges.append([question * (place == 0), str(n), number(mean, 2), told(*often)])
+        for place, family in enumerate(dict.fromkeys(it["family"] for it in asked)):
+            here = np.array([it["family"] == family for it in asked])
+            families.append([question * (place == 0), family, *_cells(chance[here], is_so[here])])
     first, last = ["asked", "so", "said"], ["log loss", "of the share", "AUC"]
     return [
         ("by question", ["the question", *first, "right at .5", *last], kinds),
@@ -145,30 +143,21 @@ def tables(told_of: Mapping[str, tuple[np.ndarray, Answered]]) -> Tables:
     ]
 
 
-def _judged(chance, is_so):
+def _cells(chance, is_so):
     """How many there are, how often it is so, what is said on average, and how good that is."""
     shares = [number(is_so.mean()), number(chance.mean())]
     losses = [number(log_loss(chance, is_so)), number(log_loss(np.full(len(is_so), is_so.mean()), is_so))]
     return [str(len(is_so)), *shares, *losses, number(area_under_curve(chance, is_so))]
 
 
-def without_family(answered: Answered, learnt: Answered) -> np.ndarray:
-    """What weights say of each family that were fitted without it, to other questions, (n,) float array."""
-    chances = np.empty(len(answered.is_so))
-    for family in np.unique(answered.families):
-        here = answered.families == family
-        chances[here] = said(fitted(learnt.of(learnt.families != family)), answered.of(here))
-    return chances
-
-
-def draw_reliability(told_of: Mapping[str, tuple[np.ndarray, Answered]], folder: Path) -> None:
+def draw_reliability(judged: Judged, folder: Path) -> None:
     """How often it is so over the probability that was said, a panel for each kind of question, with counts."""
     figure, panels = sheet(5.4, rows=2, columns=2, sharex=True, sharey=True)
     for axes, (about, question) in zip(panels.ravel(), QUESTIONS.items(), strict=True):
         axes.plot([0, 1], [0, 1], color=GREY, linewidth=0.8, zorder=0)
         axes.set_title(question, fontsize=9)
         axes.set(xlim=(-0.03, 1.03), ylim=(-0.03, 1.03), aspect="equal")
-        for count, mean, (often, low, high) in parts(*told_of[about]) if about in told_of else ():
+        for count, mean, (often, low, high) in parts(*judged[about]) if about in judged else ():
             axes.vlines(mean, low, high, color=BLUE, linewidth=1.5)
             axes.plot(mean, often, "o", color=BLUE, markersize=5)
             right = mean < 0.8  # of the dot, or there is no room
@@ -177,12 +166,6 @@ def draw_reliability(told_of: Mapping[str, tuple[np.ndarray, Answered]], folder:
     figure.supxlabel("probability that was said", fontsize=9)
     figure.supylabel("how often it was so", fontsize=9)
     keep(figure, folder, "probabilities")
-
-
-def weights_of(answered: Mapping[str, Answered], without: str | None = None) -> Weights:
-    """By question: fitted to all questions, or to those of all families but one."""
-    some = {about: it if without is None else it.of(it.families != without) for about, it in answered.items()}
-    return {about: fitted(it) for about, it in some.items()}
 
 
 def measure(case: Case, weights: Weights) -> dict[str, float]:
@@ -198,21 +181,19 @@ def measure(case: Case, weights: Weights) -> dict[str, float]:
             ASKED[about].weights = own
 
 
-def table(rows: list[dict]) -> Table:
+def transfer_tables(rows: list[dict]) -> Tables:
     """By family: shares with weights fitted to all families, with those fitted to the others, and the difference."""
     lines = []
-    for family in [*dict.fromkeys(row["family"] for row in rows), "all"]:
-        here = rows if family == "all" else pick(rows, family=family)
-        rows_of = (pick(here, weights=name) for name in (SEEN, UNSEEN))
-        seen, unseen = ({(row["shape"], row["variant"]): row for row in each} for each in rows_of)
+    for family, here in {**grouped(rows, "family"), "all": rows}.items():
+        seen, unseen = pick(here, weights=SEEN), pick(here, weights=UNSEEN)  # the same clouds in the same order
         cells = []
         for name in MEASURES:
-            sides = [[float(side[cloud].get(name, False)) for cloud in seen] for side in (seen, unseen)]
-            change = mean_with_interval([shape for shape, _ in seen], [b - a for a, b in zip(*sides, strict=True)])
-            cells += [*(number(sum(side) / len(seen), 2) for side in sides), told(*change, 2, sign="+")]
+            sides = [np.array([bool(row.get(name)) for row in side], float) for side in (seen, unseen)]
+            change = mean_with_interval([row["shape"] for row in seen], sides[1] - sides[0])
+            cells += [*(number(side.mean(), 2) for side in sides), told(*change, 2, sign="+")]
         lines.append([family, str(len(seen)), *cells])
     header = [f"{name}{word}" for name in MEASURES for word in (", all", ", others", ": change")]
-    return "weights fitted to all families, and to the others", ["family", "clouds", *header], lines
+    return [("weights fitted to all families, and to the others", ["family", "clouds", *header], lines)]
 
 
 def rows_of(sources: list[Path] | None, own: bool, variant: str, shapes: str, jobs: int) -> list[dict]:
@@ -240,8 +221,8 @@ def fit(
     """The weights with which the questions are answered best, as the classes of the questions have them."""
     rows = rows_of(sources, own, variant, shapes, jobs)
     save(output, rows)
-    for about, answered in by_question(rows).items():
-        lines = [f'    "{name}": {weight:.2f},' for name, weight in fitted(answered).items()]
+    for about, asked in by_question(rows).items():
+        lines = [f'    "{name}": {weight:.2f},' for name, weight in fitted(asked).items()]
         typer.echo("\n".join([f"{about} = {{", *lines, "}"]))
 
 
@@ -252,52 +233,50 @@ def check(
     variant: Variants = EVERY,
     shapes: Shapes = "",
     leave_family_out: Annotated[
-        bool,
-        typer.Option(
-            "--leave-family-out", help="Not the package's weights, but for each family those fitted to the others."
-        ),
+        bool, typer.Option("--leave-family-out", help="For each family, weights that were fitted to the others.")
     ] = False,
     learnt: Annotated[
         Path | None,
         typer.Option("--from", metavar="JSON", exists=True, dir_okay=False, help="Fitted to these, else to the same."),
     ] = None,
-    page: Annotated[
-        Path | None,
-        typer.Option("--page", help="Put the tables into this page, a picture beside it.", callback=page_with("check")),
-    ] = None,
+    page: Page = None,
     jobs: Jobs = 2,
     output: Output = None,
-    markdown: Markdown = False,
 ) -> None:
     """Whether what has some probability is so as often."""
     rows = rows_of(sources, own, variant, shapes, jobs)
     save(output, rows)
     found = by_question(rows)
-    if leave_family_out:
-        others = by_question(read(learnt)["rows"]) if learnt else found
-        told = {about: (without_family(it, others[about]), it) for about, it in found.items()}
-    else:
-        told = {about: (said(ASKED[about].weights, it), it) for about, it in found.items()}
-    shown = tables(told)
-    present(shown, markdown)
+    others = by_question(read(learnt)["rows"]) if learnt else found
+    judged = {
+        about: (said_by_others(it, others[about]) if leave_family_out else said(ASKED[about].weights, it), it)
+        for about, it in found.items()
+    }
+    shown = tables(judged)
+    present(shown)
     if page is not None:
         fill(page, {"check": shown})
-        draw_reliability(told, page.parent / "images")
+        draw_reliability(judged, page.parent / "images")
 
 
-@study(app, lambda rows: [table(rows)], "transfer")
+@app.command()
 def transfer(
     learnt: Saved,
     folder: Annotated[Path, typer.Argument(metavar="DIR", exists=True, file_okay=False, help="Other shapes.")],
     variant: Variants = "*",
     shapes: Shapes = "",
     jobs: Jobs = 2,
-) -> list[dict]:
+    output: Output = None,
+    page: Page = None,
+) -> None:
     """Right topologies with weights fitted to all families, and for each family with those fitted to the others."""
-    answered = by_question(read(learnt)["rows"])
+    known = by_question(read(learnt)["rows"])
     found = cases(folder, False, variant, shapes)
-    seen = weights_of(answered)
-    unseen = {family: weights_of(answered, family) for family in {case.facts["family"] for case in found}}
+    seen = {about: fitted(asked) for about, asked in known.items()}
+    unseen = {
+        family: {about: fitted([it for it in asked if it["family"] != family]) for about, asked in known.items()}
+        for family in {case.facts["family"] for case in found}
+    }
     work = [(dict(weights=SEEN, **case.facts), (case, seen)) for case in found]
     work += [(dict(weights=UNSEEN, **case.facts), (case, unseen[case.facts["family"]])) for case in found]
-    return run(measure, work, jobs)
+    publish(run(measure, work, jobs), transfer_tables, output, page, "transfer")

@@ -136,24 +136,20 @@ def cases(
     patterns such as ``*_4096`` of what the folders have; shapes are names with commas, a number for so many, or empty.
     """
     asked = variants.split(",")
-    offers: dict[Path | None, dict[str, list[str] | None]]
+    offers: dict[Path | None, dict[str, list[str]]]
     if own:
         makable = [name for name in asked if BUILTIN_VARIANT.fullmatch(name)]
         offers = {None: dict.fromkeys(BUILTIN, makable)}
     else:
         places = [folders] if isinstance(folders, Path) else folders or [None]
         offers = {place: _offers(place) for place in (folder_or(it, "GLSK_TRUTH", "shared/truth") for it in places)}
-    named = _chosen(list(dict.fromkeys(chain.from_iterable(offers.values()))), shapes)
-    there = list(dict.fromkeys(it for offer in offers.values() for variants in offer.values() for it in variants or ()))
-    wanted = list(dict.fromkeys(chain.from_iterable(matching(there, name) or [name] for name in asked)))
+    names = _chosen(list(dict.fromkeys(chain.from_iterable(offers.values()))), shapes)
+    known = dict.fromkeys(it for offer in offers.values() for held in offer.values() for it in held)
+    wanted = dict.fromkeys(chain.from_iterable(matching([*known], name) or [name] for name in asked))
     found: list[Case] = []
     missing: Counter[str] = Counter()
-    for variant, name in product(wanted, named):
-        # a file that cannot be read has whatever is asked for: its row will say what is wrong with it
-        held = {
-            place: wanted if offer.get(name, ()) is None else offer.get(name, ()) for place, offer in offers.items()
-        }
-        having = [place for place, variants in held.items() if variant in variants]
+    for variant, name in product(wanted, names):
+        having = [place for place, offer in offers.items() if variant in offer.get(name, ())]
         found += [Case(name, variant, place, draw) for draw, place in enumerate(having * (draws if own else 1))]
         missing[variant] += not having
     if not found:
@@ -182,31 +178,28 @@ def folder_or(folder: Path | None, variable: str, beside: str) -> Path:
     return folder
 
 
-def _offers(folder: Path) -> dict[str, list[str] | None]:
-    """The variants to be scored of each shape with a meaningful skeleton; None if its file cannot be read."""
+def _offers(folder: Path) -> dict[str, list[str]]:
+    """The variants to be scored of each shape with a meaningful skeleton."""
     if (folder / INDEX_NAME).is_file():  # a public benchmark
-        offers: dict[str, list[str] | None] = {}
+        offers: dict[str, list[str]] = {}
         for cloud in _benchmark(folder).scored:
             offers.setdefault(cloud.shape, []).append(cloud.variant)
         return offers
-    if not (folder / "manifest.json").exists():
-        return {path.stem: _variants(path, {}) for path in sorted(folder.glob("*.npz"))}
-    shapes = json.loads((folder / "manifest.json").read_text())["shapes"]
-    return {
-        shape["name"]: _variants(folder / f"{shape['name']}.npz", shape.get("coverage", {}))
-        for shape in shapes
-        if shape["meaningful_skeleton"]
-    }
+    manifest, coverage = folder / "manifest.json", {path.stem: {} for path in sorted(folder.glob("*.npz"))}
+    if manifest.exists():
+        shapes = json.loads(manifest.read_text())["shapes"]
+        coverage = {it["name"]: it.get("coverage", {}) for it in shapes if it["meaningful_skeleton"]}
+    return {name: _variants(folder / f"{name}.npz", shares) for name, shares in coverage.items()}
 
 
 _benchmark = lru_cache(maxsize=4)(read_folder)  # once, and not for every cloud
 
 
-def _variants(path: Path, coverage: dict[str, float]) -> list[str] | None:
+def _variants(path: Path, coverage: dict[str, float]) -> list[str]:
     """The clouds of a file that show enough of the axis."""
     try:
         with np.load(path) as archive:
             names = [name for name in archive.files if name not in ("nodes", "edges", "radii")]
-    except (OSError, ValueError, BadZipFile):
-        return None
+    except (OSError, ValueError, BadZipFile) as error:
+        raise typer.BadParameter(f"{path} cannot be read: {error}") from None
     return [name for name in names if coverage.get(name, 1.0) >= SHOWN]

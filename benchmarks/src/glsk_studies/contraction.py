@@ -18,8 +18,9 @@ from glsk_o3d.pipelines import default, wen2024
 from .clouds import Case, cases
 from .runs import named, run, with_solves
 from .scans import Scan, scanned
+from .stages import by_size
 from .stopwatch import in_turns, yardstick
-from .tables import Table, Tables, good, keep, look, pick, sheet
+from .tables import Table, Tables, good, keep, look, pick, quartiles, sheet
 
 BASES: dict[str, Callable[[], Pipeline]] = {"wen2024": wen2024, "default": default}
 WHOLE = ("cao2010", "wen2024", "default")
@@ -107,17 +108,9 @@ def ratios(rows: list[dict], over: tuple, under: tuple) -> np.ndarray:
     return np.array([a["cpu"] / b["cpu"] for a, b, _ in pairs])
 
 
-def quartiles(values: np.ndarray, digits: int = 2) -> str:
-    """Median and quartiles in words."""
-    if len(values) == 0:
-        return "-"
-    low, middle, high = (f"{value:.{digits}f}" for value in np.quantile(values, [0.25, 0.5, 0.75]))
-    return f"{middle} ({low} to {high})"
-
-
 def figure_tables(rows: list[dict]) -> Tables:
     """For each pipeline the ratio to the baseline and what it is made of; what is left of the clouds; the whole."""
-    at = {n: pick(good(rows), n=n) for n in sorted({row["n"] for row in good(rows)})}
+    at = by_size(good(rows))
     tables = [ratio_table(base, at, rows[0]["fixed"]) for base in BASES]
     tables += [contraction_table(at), whole_table(at)]
     if failed := [row for row in rows if "failure" in row]:
@@ -172,8 +165,8 @@ def shown() -> dict[str, tuple[str, bool, str]]:
 
 def draw_figures(rows: list[dict], folder: Path) -> None:
     """A picture for each size: cost and remaining points of every cloud, in the order of what the baseline costs."""
-    for n in sorted({row["n"] for row in good(rows)}):
-        here = sorted(pick(good(rows), n=n), key=lambda row: take(row, BASELINE)["cpu"])
+    for n, group in by_size(good(rows)).items():
+        here = sorted(group, key=lambda row: take(row, BASELINE)["cpu"])
         figure, (above, below) = sheet(5.5, rows=2, width=max(6, 2.5 + 0.16 * len(here)), sharex=True)
         for name, key in shown().items():
             runs, style = [take(row, key) for row in here], look(name)

@@ -12,6 +12,7 @@ import time
 from collections import Counter
 from itertools import pairwise
 from pathlib import Path
+from statistics import fmean
 from typing import Annotated
 
 import numpy as np
@@ -20,15 +21,15 @@ import typer
 from glsk_bench.repeating import spread
 from glsk_bench.scoring import score
 from glsk_bench.truths import read_axis
-from scipy.optimize import minimize
 
 from glsk_o3d import read_cloud, skeletonize
 from glsk_o3d.apps.crosscheck import cross_check
 from glsk_o3d.apps.crosscheck.agreement import VERDICTS, WEIGHTS, of_counts, of_limbs
 
+from .calibrate import logistic_weights
 from .clouds import Case, cases
-from .runs import Folders, Jobs, Markdown, Own, Shapes, Variants, application, run, study
-from .tables import Tables, cells_of, good, grouped, number, present, read
+from .runs import Folders, Jobs, Output, Own, Shapes, Variants, application, publish, run
+from .tables import Table, Tables, fixed, good, grouped, middle, number, present, read, table
 
 STEPS = (0, 0.25, 0.5, 0.75, 0.9, 0.96, 1)  # of the reliability table
 RIDGE = 0.05  # of the fit: what a weight costs
@@ -79,40 +80,52 @@ def sampled(path: Path, poisson: bool) -> np.ndarray:
 
 def verdict_tables(rows: list[dict]) -> Tables:
     """Verdicts by family, what the promises come to, how the probability is to be taken, and what failed."""
-    lines, found = [], good(rows)
-    for name, here in [*grouped(rows, "family").items(), ("all", rows)]:
-        for variant in dict.fromkeys(row["variant"] for row in here) if name != "all" else [""]:
-            some = [row for row in good(here) if variant in ("", row["variant"])]
-            count = Counter((row["verdict"], row["right"]) for row in some)
-            cells = [f"{count[it, True]} / {count[it, True] + count[it, False]}" for it in VERDICTS]
-            cells += [number(np.median([of(row) for row in some]), 2) if some else "-" for of in MEDIANS.values()]
-            lines.append([f"{name} {variant}".removesuffix("_4096").strip(), *cells])
-    noisy = np.array([row["variant"].startswith("noise") for row in found], bool)
-    verdict, right = np.array([row["verdict"] for row in found]), np.array([row["right"] for row in found], bool)
-    shares = {
-        "of 'agrees' the graph is right": right[verdict == AGREES],
-        "of wrong graphs 'agrees'": (verdict == AGREES)[~right],
-        "of right graphs 'agrees'": (verdict == AGREES)[right],
-        "of clean clouds 'cannot tell'": (verdict == CANNOT_TELL)[~noisy],
-        "of noisy clouds 'cannot tell'": (verdict == CANNOT_TELL)[noisy],
+    found = good(rows)
+    groups = {
+        f"{family} {variant}".removesuffix("_4096"): here
+        for family, those in grouped(found, "family").items()
+        for variant, here in grouped(those, "variant").items()
     }
-    promises = [[it, str(len(held)), number(100 * held.mean(), 1) if len(held) else "-"] for it, held in shares.items()]
-    probability, steps = np.array([row["probability"] for row in found]), []
-    for low, high in pairwise(STEPS):
-        here = (low <= probability) & (probability < high) & (verdict != CANNOT_TELL)
-        if here.any():
-            means = [number(each[here].mean(), 2) for each in (probability, right)]
-            steps.append([f"{low} to {high}", str(here.sum()), *means])
+    lines = [[name, *verdict_cells(here)] for name, here in {**groups, "all": found}.items()]
+    tables = [("Right graphs / verdicts", ["clouds", *VERDICTS, *MEDIANS], lines), share_table(found)]
     failed = [[row["shape"], row["variant"], row["failure"]] for row in rows if "failure" in row]
-    return [
-        ("Right graphs / verdicts", ["clouds", *VERDICTS, *MEDIANS], lines),
-        ("Shares", ["share", "clouds", "%"], promises),
-        ("Probability", ["said", "clouds", "mean", "right"], steps),
-        *([("Failures", ["shape", "variant", "note"], failed)] if failed else []),
-    ]
+    return [*tables, step_table(found), *([("Failures", ["shape", "variant", "note"], failed)] if failed else [])]
 
 
-@study(app, verdict_tables)
+def verdict_cells(rows: list[dict]) -> list[str]:
+    """How many graphs are right, of how many with each verdict; and medians."""
+    count = Counter((row["verdict"], row["right"]) for row in rows)
+    cells = [f"{count[it, True]} / {count[it, True] + count[it, False]}" for it in VERDICTS]
+    return cells + [number(middle(rows, of), 2) for of in MEDIANS.values()]
+
+
+def share_table(rows: list[dict]) -> Table:
+    """What the promises come to."""
+    noisy = np.array([row["variant"].startswith("noise") for row in rows], bool)
+    right = np.array([row["right"] for row in rows], bool)
+    agrees, unknown = (np.array([row["verdict"] == it for row in rows], bool) for it in (AGREES, CANNOT_TELL))
+    shares = {
+        "of 'agrees' the graph is right": right[agrees],
+        "of wrong graphs 'agrees'": agrees[~right],
+        "of right graphs 'agrees'": agrees[right],
+        "of clean clouds 'cannot tell'": unknown[~noisy],
+        "of noisy clouds 'cannot tell'": unknown[noisy],
+    }
+    lines = [[it, str(len(held)), number(100 * held.mean(), 1) if len(held) else "-"] for it, held in shares.items()]
+    return "Shares", ["share", "clouds", "%"], lines
+
+
+def step_table(rows: list[dict]) -> Table:
+    """How often the graph is right, by steps of the probability."""
+    known, lines = [row for row in rows if row["verdict"] != CANNOT_TELL], []
+    for low, high in pairwise(STEPS):
+        if here := [row for row in known if low <= row["probability"] < high]:
+            means = [number(fmean(row[fact] for row in here), 2) for fact in ("probability", "right")]
+            lines.append([f"{low} to {high}", str(len(here)), *means])
+    return "Probability", ["said", "clouds", "mean", "right"], lines
+
+
+@app.command()
 def verdicts(
     folders: Folders = None,
     own: Own = False,
@@ -120,7 +133,8 @@ def verdicts(
     shapes: Shapes = "",
     meshes: Annotated[Path | None, typer.Option(metavar="DIR", help="Also meshes with manifest.json.")] = None,
     jobs: Jobs = 2,
-) -> list[dict]:
+    output: Output = None,
+) -> None:
     """How often each verdict is given, and how often the graph is right then."""
     work: list[tuple[dict, tuple]] = []
     if own or folders or not meshes:
@@ -130,44 +144,31 @@ def verdicts(
             for poisson, name in enumerate(("by area", "evenly spaced")):
                 facts = dict(variant=name, shape=known["name"], family="meshes")
                 work.append((facts, ((meshes / f"{known['name']}.ply", known, bool(poisson)),)))
-    return run(checked, work, jobs)
+    publish(run(checked, work, jobs), verdict_tables, output)
 
 
 @app.command()
-def fit(
-    files: Annotated[list[Path], typer.Argument(metavar="JSON...", exists=True)], markdown: Markdown = False
-) -> None:
+def fit(files: Annotated[list[Path], typer.Argument(metavar="JSON...", exists=True)]) -> None:
     """The weights of the probability, fitted to rows that `verdicts -o` has saved."""
     rows = [row for file in files for row in good(read(file)["rows"])]
-    values = np.array([[1.0, row["facts"]["solid"], row["facts"]["limbs"], row["skeletons"]["doubt"]] for row in rows])
-    right = np.array([row["right"] for row in rows])
-
-    def loss(weights: np.ndarray) -> float:
-        total = np.where(right, -1, 1) * (values @ weights)
-        return float(np.logaddexp(0, total).sum() + RIDGE / 2 * (weights[1:] ** 2).sum())
-
-    weights = minimize(loss, np.zeros(len(FITTED))).x
-    lines = [[name, number(found, 2), number(WEIGHTS[name], 1)] for name, found in zip(FITTED, weights, strict=True)]
-    present([(f"{len(rows)} clouds", ["fact", "fitted", "in use"], lines)], markdown)
+    facts = np.array([[row["facts"]["solid"], row["facts"]["limbs"], row["skeletons"]["doubt"]] for row in rows])
+    weights = logistic_weights(facts, np.array([row["right"] for row in rows], bool), RIDGE)
+    lines = [[name, number(it, 2), number(WEIGHTS[name], 1)] for name, it in zip(FITTED, weights, strict=True)]
+    present([(f"{len(rows)} clouds", ["fact", "fitted", "in use"], lines)])
 
 
 def scan_tables(rows: list[dict]) -> Tables:
     """A line for each scan, with the verdict."""
-    header = ["cloud", "points", "CPU s", "angle", "eigenvalues", "apart", "loops", "genus", "parts", "probability"]
-
-    def cells(row):
-        values = [number(MEDIANS[name](row), 2) for name in ("angle", "eigenvalues", "apart")]
-        mesh = [str(row["skeletons"]["loops"][0]), str(row["mesh"]["genus"]), str(row["mesh"]["solids"])]
-        first = [str(row["points"]["given"]), number(row["cpu"], 1)]
-        return [*first, *values, *mesh, number(row["probability"], 2)]
-
-    lines = cells_of(rows, ["cloud"], cells, 9)
-    for line, row in zip(lines, rows, strict=True):
-        line[-1] = row.get("verdict", line[-1])
-    return [("Cross-checks", [*header, "note"], lines)]
+    columns = {"cloud": "cloud", "points": lambda row: row["points"]["given"], "CPU s": fixed("cpu", 1)}
+    columns |= {name: lambda row, of=MEDIANS[name]: number(of(row), 2) for name in ("angle", "eigenvalues", "apart")}
+    columns |= {"loops": lambda row: row["skeletons"]["loops"][0], "genus": lambda row: row["mesh"]["genus"]}
+    columns |= {"parts": lambda row: row["mesh"]["solids"], "probability": fixed("probability"), "verdict": "verdict"}
+    return [table("Cross-checks", rows, columns)]
 
 
-@study(app, scan_tables)
-def scans(files: Annotated[list[Path], typer.Argument(metavar="SCAN...", exists=True)], jobs: Jobs = 2) -> list[dict]:
+@app.command()
+def scans(
+    files: Annotated[list[Path], typer.Argument(metavar="SCAN...", exists=True)], jobs: Jobs = 2, output: Output = None
+) -> None:
     """What the check says of some scans."""
-    return run(checked, [(dict(cloud=path.stem), (path,)) for path in files], jobs)
+    publish(run(checked, [(dict(cloud=path.stem), (path,)) for path in files], jobs), scan_tables, output)

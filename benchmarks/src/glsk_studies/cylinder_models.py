@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,8 +16,6 @@ MATRIX_STRUCTS = ("OptQSM", "QSM")  # of TreeQSM's .mat, each with a struct call
 # published: the columns of TreeQSM's text, which has one name for each three of them (TreeQSM's manual)
 TEXT_COLUMNS = ("radius", "length", "start.x", "start.y", "start.z", "axis.x", "axis.y", "axis.z")
 TEXT_COLUMNS += ("parent", "extension", "branch", "BranchOrder", "PositionInBranch")
-
-
 STARTS, ENDS = ("startX", "startY", "startZ"), ("endX", "endY", "endZ")
 PROGRAMS = {
     "TreeQSM": (("start.x", "start.y", "start.z"), ("axis.x", "axis.y", "axis.z"), "radius", "BranchOrder", 0),
@@ -26,6 +23,8 @@ PROGRAMS = {
     "aRchi": (STARTS, ENDS, "radius_cyl", "branching_order", 1),
 }
 """What the columns of a program are called: starts, ends or directions, radii, orders; and which order its stem has."""
+
+Columns = dict[str, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -38,14 +37,9 @@ class CylinderModel:
     order: np.ndarray
 
     @property
-    def length(self) -> np.ndarray:
-        """Of each cylinder."""
-        return norm(self.end - self.start)
-
-    @property
     def volume(self) -> float:
         """Of all cylinders; where two overlap it counts twice, as in the programs that make them."""
-        return float(np.pi * (self.radius**2 * self.length).sum())
+        return float(np.pi * (self.radius**2 * norm(self.end - self.start)).sum())
 
     @property
     def height(self) -> float:
@@ -57,8 +51,8 @@ class CylinderModel:
         """Of the cylinder of the stem 1.3 m above the lowest end; NaN where there is none."""
         heights = np.array([self.start[:, 2], self.end[:, 2]])
         level = heights.min() + BREAST_HEIGHT
-        there = (self.order == 0) & (heights.min(axis=0) <= level) & (level <= heights.max(axis=0))
-        return float(2 * self.radius[there].mean()) if there.any() else float("nan")
+        at_level = (self.order == 0) & (heights.min(axis=0) <= level) & (level <= heights.max(axis=0))
+        return float(2 * self.radius[at_level].mean()) if at_level.any() else float("nan")
 
 
 def read_cylinder_model(path: Path) -> CylinderModel:
@@ -66,7 +60,7 @@ def read_cylinder_model(path: Path) -> CylinderModel:
 
     A ``.mat`` has the struct ``cylinder``, by itself or in `MATRIX_STRUCTS`; of several models the first counts.
     """
-    columns = _of_matrix(path) if path.suffix == ".mat" else _of_text(path)
+    columns = matrix_columns(path) if path.suffix == ".mat" else text_columns(path)
     for starts, ends, radius, order, stem in PROGRAMS.values():
         if {*starts, *ends, radius, order, "length"} <= columns.keys():
             start, end = (np.stack([columns[name] for name in names], axis=1) for names in (starts, ends))
@@ -75,32 +69,29 @@ def read_cylinder_model(path: Path) -> CylinderModel:
     raise typer.BadParameter(f"{path}: no columns of {', '.join(PROGRAMS)}; there are {', '.join(columns)}")
 
 
-def _of_text(path: Path) -> Mapping[str, np.ndarray]:
+def text_columns(path: Path) -> Columns:
     """Columns by their names; commas, semicolons, tabs or spaces are between them."""
     first, *rest = path.read_text(encoding="utf-8-sig").replace('"', "").splitlines() or [""]
     between = next((mark for mark in (",", ";", "\t") if mark in first), None)
-    try:
-        rows = np.genfromtxt(rest, delimiter=between, ndmin=2) if any(map(str.strip, rest)) else np.empty((0, 0))
-    except ValueError:
-        raise typer.BadParameter(f"{path}: no table: its lines have different numbers of columns") from None
     names = [name.strip() for name in first.split(between)]
-    if rows.shape[1] == len(names) + 1:  # R writes the numbers of rows, and no name above them
-        rows = rows[:, 1:]
-    if names[0].startswith("radius") and "start_point" in names and rows.shape[1] >= len(TEXT_COLUMNS):
-        names, rows = list(TEXT_COLUMNS), rows[:, : len(TEXT_COLUMNS)]
-    if rows.shape[1] != len(names):
-        raise typer.BadParameter(f"{path}: {len(names)} names stand above {rows.shape[1]} columns of numbers")
-    return dict(zip(names, rows.T, strict=True))
+    try:
+        rows = np.genfromtxt(rest, delimiter=between, ndmin=2)
+        if "start_point" in names:
+            names, rows = list(TEXT_COLUMNS), rows[:, : len(TEXT_COLUMNS)]
+        # R writes the numbers of rows, and no name above them
+        return dict(zip(names, rows.T[rows.shape[1] - len(names) :], strict=True))
+    except ValueError as error:
+        raise typer.BadParameter(f"{path}: no table with a name above each column: {error}") from None
 
 
-def _of_matrix(path: Path) -> Mapping[str, np.ndarray]:
+def matrix_columns(path: Path) -> Columns:
     """Fields of the struct ``cylinder``; one of three columns becomes ``name.x``, ``name.y`` and ``name.z``."""
     found = loadmat(path, squeeze_me=True, struct_as_record=False)
     holder = next((np.atleast_1d(found[name])[0] for name in MATRIX_STRUCTS if name in found), None)
     cylinder = found.get("cylinder") if holder is None else holder.cylinder
     if cylinder is None:
         raise typer.BadParameter(f"{path}: has no struct called cylinder, {' or '.join(MATRIX_STRUCTS)}")
-    columns: dict[str, np.ndarray] = {}
+    columns: Columns = {}
     for name in cylinder._fieldnames:
         field = np.atleast_1d(getattr(cylinder, name)).astype(float)
         if field.ndim == 2 and field.shape[1] == 3:

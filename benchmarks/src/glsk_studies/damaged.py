@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import tempfile
 import warnings
 from collections.abc import Callable
@@ -35,23 +34,22 @@ EXTREMES = (-1, 0, 1, 2**31 - 1, 2**31, 2**32, 2**63, 10**18, 10**400, "1e308", 
 ENDINGS = (".ply", ".pcd", ".xyz", ".obj", ".stl", ".las", ".laz", ".e57", ".json", ".npz", ".swc")
 
 
-def file_case(rng: np.random.Generator, folder: Path) -> tuple[str, str, list[str]]:
-    """Read one damaged file, written into a folder: its kind, whether it was ``"read"`` or ``"refused"``, findings."""
+def damaged_file(rng: np.random.Generator) -> tuple[str, str, str, bytes]:
+    """The kind and ending of a file in words; its kind, its ending, perhaps a wrong one, and its bytes."""
     names = [*seeds()]
     name = names[rng.integers(len(names))]
     kind, ending = name.split()[:2]
     data = damaged(seeds()[name], rng)
-    if kind in ("cloud", "skeleton") and rng.random() < 0.05:
-        ending = str(rng.choice(ENDINGS))
-    return f"{kind} {name.split()[1]}", *read(kind, ending, data, folder)
+    wrong = kind in ("cloud", "skeleton") and rng.random() < 0.05
+    return f"{kind} {ending}", kind, str(rng.choice(ENDINGS)) if wrong else ending, data
 
 
-def read(kind: str, ending: str, data: bytes, folder: Path) -> tuple[str, list[str]]:
-    """Read a file, written into a folder: whether it was ``"read"`` or ``"refused"``, and findings."""
-    path = folder / ("ledger.jsonl" if kind == "ledger" else f"f{ending}")
-    path.write_bytes(data)
-    with warnings.catch_warnings():
+def read(kind: str, ending: str, data: bytes) -> tuple[str, list[str]]:
+    """Whether a file was ``"read"`` or ``"refused"``, and findings."""
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("error")
+        path = Path(folder, "ledger.jsonl" if kind == "ledger" else f"f{ending}")
+        path.write_bytes(data)
         try:
             READERS[kind](path)
             return "read", []
@@ -62,8 +60,6 @@ def read(kind: str, ending: str, data: bytes, folder: Path) -> tuple[str, list[s
             if isinstance(error.__cause__, MemoryError) or "bad_alloc" in message or "Unable to allocate" in message:
                 findings.append("it asked for more memory than there is")
             return "refused", findings
-        finally:
-            path.unlink()
 
 
 def damaged(data: bytes, rng: np.random.Generator) -> bytes:
@@ -123,65 +119,38 @@ def _clouds(folder: Path) -> dict[str, bytes]:
     o3d = import_open3d()
     points = samples.torus(60).points
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
-    cloud.colors = cloud.normals = cloud.points
+    cloud.normals = cloud.points
+    cloud.colors = o3d.utility.Vector3dVector(np.abs(points) % 1)
     mesh = o3d.geometry.TriangleMesh.create_torus(1, 0.3, 6, 5)
-    mesh.compute_vertex_normals()
-    found = {}
-    for ending, options in {
-        ".pcd binary": {},
-        ".pcd ascii": {"write_ascii": True},
-        ".pcd compressed": {"compressed": True},
-        ".ply binary": {},
-        ".ply ascii": {"write_ascii": True},
-        ".xyz": {},
-    }.items():
-        path = folder / f"s{ending.split()[0]}"
-        o3d.io.write_point_cloud(str(path), cloud, **options)
-        found[f"cloud {ending}"] = path.read_bytes()
-    for ending in (".obj", ".stl", ".ply mesh"):
-        path = folder / f"m{ending.split()[0]}"
-        o3d.io.write_triangle_mesh(str(path), mesh)
-        found[f"cloud {ending}"] = path.read_bytes()
+    o3d.io.write_point_cloud(str(folder / "binary.pcd"), cloud)
+    o3d.io.write_point_cloud(str(folder / "ascii.pcd"), cloud, write_ascii=True)
+    o3d.io.write_point_cloud(str(folder / "compressed.pcd"), cloud, compressed=True)
+    o3d.io.write_point_cloud(str(folder / "binary.ply"), cloud)
+    o3d.io.write_point_cloud(str(folder / "ascii.ply"), cloud, write_ascii=True)
+    o3d.io.write_point_cloud(str(folder / "points.xyz"), cloud)
+    o3d.io.write_triangle_mesh(str(folder / "mesh.obj"), mesh, write_vertex_normals=False)
+    o3d.io.write_triangle_mesh(str(folder / "mesh.stl"), mesh.compute_vertex_normals())
+    o3d.io.write_triangle_mesh(str(folder / "mesh.ply"), mesh)
     rows = "\n".join(",".join(f"{value:.3f}" for value in row) + ",1" for row in points)
-    found["cloud .csv"] = f"x,y,z,label\n{rows}\n".encode()
-    found["cloud .txt"] = rows.replace(",", " ").encode()
+    (folder / "table.csv").write_text(f"x,y,z,label\n{rows}\n")
+    (folder / "table.txt").write_text(rows.replace(",", " "))
     head = "ply\nformat ascii 1.0\nelement extra 2\nproperty list uchar int of\nelement vertex 60\n"
     head += "".join(f"property double {axis}\n" for axis in "xyz") + "property float label\nend_header\n2 0 1\n1 5\n"
-    found["cloud .ply list"] = (head + found["cloud .txt"].decode() + "\n").encode()
+    (folder / "list.ply").write_text(head + rows.replace(",", " ") + "\n")
     if find_spec("laspy") and find_spec("lazrs"):
         import laspy
 
         for number in (0, 3, 7):
             scan = laspy.LasData(laspy.LasHeader(point_format=number, version="1.4" if number == 7 else "1.2"))
             scan.x, scan.y, scan.z = points.T
-            for ending in (".las", ".laz"):
-                scan.write(str(folder / f"s{ending}"))
-                found[f"cloud {ending} {number}"] = (folder / f"s{ending}").read_bytes()
-            found[f"cloud .laz {number} chunks"] = _in_chunks(
-                found[f"cloud .laz {number}"], scan.points.array.tobytes()
-            )
+            scan.write(str(folder / f"format{number}.las"))
+            scan.write(str(folder / f"format{number}.laz"))
     if find_spec("pye57"):
         import pye57
 
-        with pye57.E57(str(folder / "s.e57"), mode="w") as file:
+        with pye57.E57(str(folder / "scan.e57"), mode="w") as file:
             file.write_scan_raw(dict(zip(("cartesianX", "cartesianY", "cartesianZ"), points.T.copy(), strict=True)))
-        found["cloud .e57"] = (folder / "s.e57").read_bytes()
-    return found
-
-
-def _in_chunks(laz: bytes, points: bytes) -> bytes:
-    """The same file with chunks of 16 points each."""
-    import lazrs
-
-    record, start = laz.index(b"laszip encoded") - 2 + 54, int.from_bytes(laz[96:100], "little")
-    stream = io.BytesIO(laz[: record + 12] + (16).to_bytes(4, "little") + laz[record + 16 : start])
-    length = int.from_bytes(laz[record - 34 : record - 32], "little")
-    vlr = lazrs.LazVlr(stream.getvalue()[record : record + length])
-    stream.seek(start)
-    packer = lazrs.LasZipCompressor(stream, vlr)
-    packer.compress_many(points)
-    packer.done()
-    return stream.getvalue()
+    return {f"cloud {path.suffix} {path.stem}": path.read_bytes() for path in sorted(folder.iterdir())}
 
 
 def _skeletons(folder: Path) -> dict[str, bytes]:

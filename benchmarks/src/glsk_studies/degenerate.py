@@ -10,6 +10,7 @@ import numpy as np
 
 import glsk_o3d as glsk
 from glsk_o3d import GlskError, Pipeline, Refiner, Sampler, Skeleton, SkeletonWarning, samples
+from glsk_o3d.geometry.vectors import unit
 
 PIPELINES = ("default", "tree", "cao2010", "wen2024")
 FITTED_SLACK = 0.0501  # of the diagonal: what a fit to the axis may do, see FIT_BEYOND
@@ -36,29 +37,24 @@ def _tiny(rng: np.random.Generator) -> np.ndarray:
 
 
 def _duplicates(rng: np.random.Generator) -> np.ndarray:
-    points = _plain(rng)
-    return points[rng.integers(0, len(points), int(rng.integers(1, 4)) * len(points))]
-
-
-def _mostly_duplicates(rng: np.random.Generator) -> np.ndarray:
-    """In one place, or in few: 99 % and more."""
+    """Each point a few times, or nearly all of them in one place."""
     points = _plain(rng)
     if rng.random() < 0.5:
-        return np.concatenate([np.repeat(points[:1], 2000, axis=0), points[:30]])
-    return np.repeat(points[:30], 100, axis=0)
+        return points[rng.integers(0, len(points), int(rng.integers(1, 4)) * len(points))]
+    return np.concatenate([np.repeat(points[:1], 2000, axis=0), points[:30]])
 
 
 def _collinear(rng: np.random.Generator) -> np.ndarray:
     n = int(rng.integers(2, 200))
     along = np.arange(n) if rng.random() < 0.3 else rng.random(n)
-    way = np.eye(3)[rng.integers(3)] if rng.random() < 0.5 else rng.normal(size=3)
-    return along[:, None] * way + rng.choice([0, 0, 1, 1e4]) * rng.normal(size=3)
+    direction = np.eye(3)[rng.integers(3)] if rng.random() < 0.5 else rng.normal(size=3)
+    return along[:, None] * direction + rng.choice([0, 0, 1, 1e4]) * rng.normal(size=3)
 
 
-def _planar(rng: np.random.Generator) -> np.ndarray:
-    points = _plain(rng)
-    flat = rng.choice([0, 0, 1e-15, 1e-12, 1e-9, 1e-6])
-    return points * rng.permutation([1, 1, flat])
+def _flat(rng: np.random.Generator) -> np.ndarray:
+    """Squeezed along one axis or two, to nothing or nearly so."""
+    thin = rng.choice([0, 0, 1e-15, 1e-12, 1e-9, 1e-6])
+    return _plain(rng) * rng.permutation([1, rng.choice([1, 1, 10.0 ** rng.uniform(-16, 0)]), thin])
 
 
 def _lattice(rng: np.random.Generator) -> np.ndarray:
@@ -77,8 +73,7 @@ def _surface_lattice(rng: np.random.Generator) -> np.ndarray:
 
 
 def _rounded(rng: np.random.Generator) -> np.ndarray:
-    points = _plain(rng)
-    return np.round(points * rng.integers(1, 12))
+    return np.round(_plain(rng) * rng.integers(1, 12))
 
 
 def _circle(rng: np.random.Generator) -> np.ndarray:
@@ -88,17 +83,18 @@ def _circle(rng: np.random.Generator) -> np.ndarray:
     return np.column_stack([np.cos(angle.ravel()), np.sin(angle.ravel()), row.ravel()])
 
 
-def _two_places(rng: np.random.Generator) -> np.ndarray:
+def _outlier(rng: np.random.Generator) -> np.ndarray:
+    """One point, a few or most of them once more, far away."""
     points = _plain(rng)
-    few = points[: int(rng.integers(1, len(points)))]
-    return np.concatenate([points, few + 10.0 ** rng.integers(1, 13) * rng.normal(size=3)])
+    few = points[: int(rng.choice([1, 3, len(points) - 1]))]
+    return np.concatenate([points, few + 10.0 ** rng.uniform(1, 15) * rng.normal(size=3)])
 
 
-def _two_points(rng: np.random.Generator) -> np.ndarray:
-    """Two places far apart, each as wide as some roundings, or not at all."""
-    places = np.array([[0.0, 0, 0], 10.0 ** rng.integers(-3, 8) * rng.normal(size=3)])
-    points = places[rng.integers(0, 2, int(rng.integers(2, 100)))]
-    return points + rng.choice([0, 1e-15, 1e-12, 1e-6]) * rng.normal(size=points.shape)
+def _clusters(rng: np.random.Generator) -> np.ndarray:
+    """Some places, near or far, each as wide as some roundings or more, or not at all."""
+    centres = 10.0 ** rng.choice([0, 0, rng.uniform(-3, 8)]) * rng.normal(size=(int(rng.integers(2, 12)), 3))
+    points = centres[rng.integers(0, len(centres), int(rng.integers(2, 400)))]
+    return points + rng.choice([0, 10.0 ** rng.uniform(-15, -1)]) * rng.normal(size=points.shape)
 
 
 def _offset(rng: np.random.Generator) -> np.ndarray:
@@ -106,13 +102,10 @@ def _offset(rng: np.random.Generator) -> np.ndarray:
 
 
 def _extreme(rng: np.random.Generator) -> np.ndarray:
+    """Of any size that a number can have, or at the limits of what is taken."""
+    exponent = rng.uniform(-308, 308) if rng.random() < 0.5 else rng.choice([-1, 1]) * rng.uniform(100, 125)
     with np.errstate(over="ignore", under="ignore"):
-        return _plain(rng) * 10.0 ** rng.uniform(-308, 308)
-
-
-def _near_extreme(rng: np.random.Generator) -> np.ndarray:
-    """At the limits of what is taken."""
-    return _plain(rng) * 10.0 ** (rng.choice([-1, 1]) * rng.uniform(100, 125))
+        return _plain(rng) * 10.0**exponent
 
 
 def _invalid(rng: np.random.Generator) -> np.ndarray:
@@ -135,63 +128,42 @@ def _roundings(rng: np.random.Generator) -> np.ndarray:
     return points + np.spacing(np.abs(points)) * rng.integers(0, 10 ** int(rng.integers(1, 6)), points.shape)
 
 
-def _clusters(rng: np.random.Generator) -> np.ndarray:
-    centres = rng.normal(size=(int(rng.integers(2, 12)), 3))
-    n = int(rng.integers(20, 400))
-    wide = 10.0 ** rng.uniform(-14, -1)
-    return centres[rng.integers(0, len(centres), n)] + wide * rng.normal(size=(n, 3))
-
-
-def _outlier(rng: np.random.Generator) -> np.ndarray:
-    points = _plain(rng)
-    few = int(rng.integers(1, 4))
-    return np.concatenate([points, 10.0 ** rng.uniform(1, 15) * rng.normal(size=(few, 3))])
-
-
 def _sphere(rng: np.random.Generator) -> np.ndarray:
-    points = rng.normal(size=(int(rng.integers(10, 400)), 3))
-    return points / np.linalg.norm(points, axis=1, keepdims=True) * rng.choice([1, 1e-9, 1e9])
+    return unit(rng.normal(size=(int(rng.integers(10, 400)), 3))) * rng.choice([1, 1e-9, 1e9])
 
 
 def _spiral(rng: np.random.Generator) -> np.ndarray:
     """On a sphere, or flat; points in no order of space, with a spacing that changes."""
-    n = int(rng.integers(10, 400))
-    t = np.linspace(0, 1, n) ** rng.choice([0.5, 1, 3])
-    angle = t * rng.uniform(1, 200)
-    if rng.random() < 0.5:
-        return np.column_stack([t * np.cos(angle), t * np.sin(angle), np.zeros(n)])
-    across = np.sqrt(np.maximum(1 - (2 * t - 1) ** 2, 0))
-    return np.column_stack([across * np.cos(angle), across * np.sin(angle), 2 * t - 1])
-
-
-def _squeezed(rng: np.random.Generator) -> np.ndarray:
-    return _plain(rng) * rng.permutation([1, 10.0 ** rng.uniform(-16, 0), 10.0 ** rng.uniform(-16, 0)])
+    t = np.linspace(0, 1, int(rng.integers(10, 400))) ** rng.choice([0.5, 1, 3])
+    angle, flat = t * rng.uniform(1, 200), rng.random() < 0.5
+    across, height = (t, 0 * t) if flat else (np.sqrt(np.maximum(1 - (2 * t - 1) ** 2, 0)), 2 * t - 1)
+    return np.column_stack([across * np.cos(angle), across * np.sin(angle), height])
 
 
 DRAWN_BY = (
-    *(_plain, _dense, _tiny, _duplicates, _mostly_duplicates, _collinear, _planar, _lattice, _surface_lattice),
-    *(_rounded, _circle, _two_places, _two_points, _offset, _extreme, _near_extreme, _invalid, _denormal),
-    *(_roundings, _clusters, _outlier, _sphere, _spiral, _squeezed),
+    *(_plain, _dense, _tiny, _duplicates, _collinear, _flat, _lattice, _surface_lattice, _rounded, _circle, _outlier),
+    *(_clusters, _offset, _extreme, _invalid, _denormal, _roundings, _sphere, _spiral),
 )
 KINDS = {draw.__name__.strip("_").replace("_", " "): draw for draw in DRAWN_BY}
 """What draws a cloud of a kind."""
 
 
-def cloud(rng: np.random.Generator) -> tuple[str, np.ndarray]:
-    """A kind from `KINDS`, and a cloud of it; of every fourth the coordinates went through float32."""
+def degenerate_cloud(rng: np.random.Generator) -> tuple[str, np.ndarray, np.ndarray, Pipeline]:
+    """A kind from `KINDS`, a cloud of it, another order of its points, and a pipeline.
+
+    Of every fourth cloud the coordinates went through float32.
+    """
     kind = str(rng.choice([*KINDS]))
     points = KINDS[kind](rng)
     if rng.random() < 0.25:
         with np.errstate(over="ignore", under="ignore"):
             points = points.astype(np.float32).astype(float)
-    return kind, points
-
-
-def array_case(rng: np.random.Generator) -> tuple[str, str, list[str]]:
-    """Run one case: the kind of its cloud, whether there is a ``"skeleton"`` or it was ``"refused"``, and findings."""
-    kind, points = cloud(rng)
     name = str(rng.choice(PIPELINES))
-    pipeline = as_drawn(getattr(glsk.pipelines, name)(), rng)
+    return kind, points, rng.permutation(len(points)), as_drawn(getattr(glsk.pipelines, name)(), rng)
+
+
+def skeletonised(points: np.ndarray, order: np.ndarray, pipeline: Pipeline) -> tuple[str, list[str]]:
+    """Whether there is a ``"skeleton"`` or it was ``"refused"``, and findings."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         warnings.simplefilter("ignore", SkeletonWarning)
@@ -200,16 +172,15 @@ def array_case(rng: np.random.Generator) -> tuple[str, str, list[str]]:
         except GlskError as error:
             words = str(error)
             plain = 10 < len(words) < 400 and "\n" not in words
-            return kind, "refused", [] if plain else [f"an error of {len(words)} characters: {words[:80]!r}"]
-        again = rng.permutation(len(points))
+            return "refused", [] if plain else [f"an error of {len(words)} characters: {words[:80]!r}"]
         try:
-            other = pipeline(points[again])
+            other = pipeline(points[order])
         except GlskError as error:
-            return kind, "skeleton", [f"refused in another order: {error}"]
+            return "skeleton", [f"refused in another order: {error}"]
     findings = unsound(skeleton, points, slack_of(pipeline))
     if "index" not in repr(pipeline):  # order="index" is published: it visits points in the order of the input
         findings += unlike(skeleton, other, diagonal_of(points))
-    return kind, "skeleton", findings
+    return "skeleton", findings
 
 
 def as_drawn(pipeline: Pipeline, rng: np.random.Generator) -> Pipeline:

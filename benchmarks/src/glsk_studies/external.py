@@ -16,7 +16,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 import typer
 from glsk_bench import add_shape
-from glsk_bench.clouds import VARIANTS, cloud, coverage
+from glsk_bench.clouds import cloud, coverage
 from glsk_bench.folders import begun
 from glsk_bench.shapes import Shape
 from glsk_bench.shapes.axis import FINE_STEP
@@ -90,31 +90,26 @@ def check_sizes(name: str, entry: Entry) -> None:
 
 
 def trees(folder: Path) -> list[Source]:
-    """The trees of which there is an axis or a cloud, ``scan_skel/tree_SIZE_N.obj``, ``scan_ply/..._res_R.ply``."""
-    axes = {path.stem for path in folder.glob("scan_skel/tree_*.obj")}
-    scanned = {path.stem.rpartition("_res_")[0] for path in folder.glob("scan_ply/tree_*_res_*.ply")}
-    return [(name, partial(tree, folder, name)) for name in sorted(axes | scanned)]
+    """The trees of which there is an axis, ``scan_skel/tree_SIZE_N.obj``."""
+    return [(path.stem, partial(tree, folder, path)) for path in sorted(folder.glob("scan_skel/tree_*.obj"))]
 
 
-def tree(folder: Path, name: str) -> Entry:
+def tree(folder: Path, path: Path) -> Entry:
     """A tree; every branch of its file begins with the place that it grows from, once more."""
-    path = folder / "scan_skel" / f"{name}.obj"
-    if path.is_file() and not holds_skeleton(path):
+    if not holds_skeleton(path):
         raise FileFormatError(f"{path}: has no lines, as the first version of these files: take the latest")
     axis = read_skeleton(path)
-    scans = sorted(folder.glob(f"scan_ply/{name}_res_*.ply"), key=lambda scan: (len(scan.name), scan.name))
+    scans = sorted(folder.glob(f"scan_ply/{path.stem}_res_*.ply"), key=lambda scan: (len(scan.name), scan.name))
     if not scans:
-        raise FileNotFoundError(f"{folder}/scan_ply/{name}_res_*.ply: no such cloud")
+        raise FileNotFoundError(f"{folder}/scan_ply/{path.stem}_res_*.ply: no such cloud")
     clouds = {f"res{scan.stem.rpartition('_')[2]}": np.asarray(read_cloud(scan).points) for scan in scans}
-    return Entry(name.split("_")[1], clouds, welded(axis.vertices, axis.edges))
+    return Entry(path.stem.split("_")[1], clouds, welded(axis.vertices, axis.edges))
 
 
 def plants(folder: Path) -> list[Source]:
-    """All ``NAME.graph.txt`` in the folder and those in it, but for hidden ones."""
-    found = sorted(path for path in folder.rglob(f"*{ENDING}") if path.is_file())
-    seen = [path for path in found if not any(part.startswith(".") for part in path.relative_to(folder).parts)]
-    names = [plain(Path(path.parent.name, path.name.removesuffix(ENDING))) for path in seen]
-    return [(name, partial(plant, path)) for name, path in zip(names, seen, strict=True)]
+    """All ``NAME.graph.txt`` in the folder and those in it."""
+    paths = sorted(path for path in folder.rglob(f"*{ENDING}") if not path.name.startswith("."))
+    return [(plain(Path(path.parent.name, path.name.removesuffix(ENDING))), partial(plant, path)) for path in paths]
 
 
 def plant(path: Path) -> Entry:
@@ -141,9 +136,9 @@ def read_graph(path: Path) -> Axis:
 
 def vessels(folder: Path, variants: Sequence[str], points: int) -> list[Source]:
     """All ``.swc`` in the folder and those in it."""
-    found = sorted(path for path in folder.rglob("*") if path.suffix.lower() == ".swc" and path.is_file())
-    names = [plain(path.relative_to(folder).with_suffix("")) for path in found]
-    return [(name, partial(vessel, path, name, variants, points)) for name, path in zip(names, found, strict=True)]
+    paths = sorted(path for path in folder.rglob("*") if path.suffix.lower() == ".swc")
+    names = [plain(path.relative_to(folder).with_suffix("")) for path in paths]
+    return [(name, partial(vessel, path, name, variants, points)) for name, path in zip(names, paths, strict=True)]
 
 
 def vessel(path: Path, name: str, variants: Sequence[str], points: int) -> Entry:
@@ -195,13 +190,8 @@ def without_stubs(nodes: np.ndarray, edges: np.ndarray, radii: np.ndarray) -> Ax
 
 def arteries(folder: Path, points: int) -> list[Source]:
     """All cases in the folder and those in it: ``CASE/morphology/centerlines.vtp``."""
-    found = sorted(folder.rglob("morphology/centerlines.vtp"))
-    if found:
-        try:
-            import vtkmodules.vtkIOXML  # noqa: F401
-        except ImportError:
-            raise MissingPackageError(f"{found[0]}: needs vtk: pip install vtk") from None
-    return [(plain(Path(path.parents[1].name)), partial(artery, path, points)) for path in found]
+    paths = sorted(folder.rglob("morphology/centerlines.vtp"))
+    return [(plain(Path(path.parents[1].name)), partial(artery, path, points)) for path in paths]
 
 
 def artery(path: Path, points: int) -> Entry:
@@ -212,9 +202,9 @@ def artery(path: Path, points: int) -> Entry:
 
 def read_lines(path: Path) -> Axis:
     """The centrelines in a file as one graph."""
+    data = _polydata(path)
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
-    data = _polydata(path)
     radii = data.GetPointData().GetArray(RADII)
     if radii is None or data.GetNumberOfLines() == 0:
         raise FileFormatError(f"{path}: has no lines with the point array {RADII}")
@@ -250,12 +240,13 @@ def joined(nodes: np.ndarray, radii: np.ndarray, lines: list[np.ndarray]) -> np.
 
 def sampled(path: Path, n: int) -> np.ndarray:
     """So many points of a surface, uniform by area."""
+    polydata = _polydata(path)
     import open3d as o3d
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkFiltersCore import vtkTriangleFilter
 
     cut = vtkTriangleFilter()
-    cut.SetInputData(_polydata(path))
+    cut.SetInputData(polydata)
     cut.Update()
     data = cut.GetOutput()
     if data.GetNumberOfPolys() == 0:
@@ -270,9 +261,11 @@ def sampled(path: Path, n: int) -> np.ndarray:
 
 
 def _polydata(path: Path) -> Any:
-    from vtkmodules.vtkCommonCore import vtkObject
-    from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
-
+    try:
+        from vtkmodules.vtkCommonCore import vtkObject
+        from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
+    except ImportError:
+        raise MissingPackageError(f"{path}: needs vtk: pip install vtk") from None
     if not path.is_file():
         raise FileNotFoundError(f"{path}: no such file")
     vtkObject.GlobalWarningDisplayOff()  # it says on the console what is said here
@@ -317,12 +310,7 @@ def vessels_(
 ) -> None:
     """SWC files, of vessels or neurons, of which clouds are drawn; and cases of Aneurisk."""
     names = list(dict.fromkeys(variants.split(",")))
-    if unknown := [name for name in names if name not in VARIANTS]:
-        raise typer.BadParameter(f"no variant {', '.join(unknown)}: there are {', '.join(VARIANTS)}")
-    try:
-        found = [*vessels(folder, names, points), *arteries(folder, points)]
-    except GlskError as error:
-        raise typer.BadParameter(str(error)) from None
+    found = [*vessels(folder, names, points), *arteries(folder, points)]
     collect(found, f"no NAME.swc and no CASE/morphology/centerlines.vtp in {folder}", output, only)
 
 

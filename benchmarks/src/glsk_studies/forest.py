@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import time
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from statistics import fmean
 
 import numpy as np
-import typer
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
@@ -25,8 +22,8 @@ from glsk_o3d.samples.capsules import visible
 
 from .cylinder_models import read_cylinder_model
 from .peers import PEERS, Graph, Peer, ours, separators_of_points, skeleton_of
-from .stopwatch import MB, peak, reset_peak, resident
-from .tables import Tables, cells_of, good, grouped, number, pick, short
+from .stopwatch import once
+from .tables import Tables, brief, good, grouped, number, pick, table
 
 CONDITIONS = ("clean", "noise", "missing", "uneven")
 SPARSE = dict(n=4096, forks=6)  # tips are 0.4 spacings thick
@@ -37,52 +34,29 @@ NEIGHBOURS = (6, 10, 20, 30)  # with which PyGEL3D is tried, since its result ha
 HEIGHT = 10.0  # in metres, to which trees are scaled for PyTLidar, whose parameters are in metres
 STEP = 0.002  # between the places at which curves are measured, as a share of the diagonal
 CLOSE = 0.01  # places nearer to the other curve are right, as a share of the diagonal
-CURVE_MEASURES = ("f1", "precision", "recall", "accuracy", "completeness", "tips", "components", "loops", "cpu")
 TREE_MEASURES = ("volume", "stem_diameter", "height", "radius")
 NOISE = 0.001  # share of the diagonal, 7 mm
 PIPELINES = {"default, untraced": ("default", {"Tracer.surface": 0}), "default": ("default", {}), "tree": ("tree", {})}
 
 
-@dataclass(frozen=True)
-class SparseTree:
-    """A cloud in some condition and its axis, z up: of a file ``NAME.npz``, or the built-in tree of a seed."""
-
-    name: str
-    condition: str
-    path: Path | None = None
-    up: str = "z"
-
-    @property
-    def facts(self) -> dict[str, str]:
-        """What a row says of it."""
-        return dict(condition=self.condition, tree=self.name)
-
-    def load(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Points (n, 3), nodes (M, 3) and edges (E, 2)."""
-        if self.path is None:
-            return builtin(int(self.name), self.condition)
-        turn = upright(self.up)
-        with np.load(self.path) as archive:
-            return archive[self.condition][:, turn].astype(float), archive["nodes"][:, turn], archive["edges"]
+def sparse_tree(name: str, condition: str, path: Path | None, up: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points (n, 3), nodes (M, 3) and edges (E, 2) of a tree, z up: of ``NAME.npz``, or the built-in one of a seed."""
+    if path is None:
+        return builtin(int(name), condition)
+    turned = np.roll(np.arange(3), 2 - "xyz".index(up))
+    with np.load(path) as archive:
+        return archive[condition][:, turned].astype(float), archive["nodes"][:, turned], archive["edges"]
 
 
-def upright(up: str) -> np.ndarray:
-    """The axes x, y and z, turned round so that the one that points up is the last: (3,) int array."""
-    if up not in ("x", "y", "z"):
-        raise typer.BadParameter(f"--up {up}: there are x, y and z")
-    return np.roll(np.arange(3), 2 - "xyz".index(up))
-
-
-def sparse_trees(folder: Path | None, up: str, trees: int) -> list[SparseTree]:
-    """The trees of a folder in all their conditions, or so many built-in ones."""
-    upright(up)
+def sparse_trees(folder: Path | None, up: str, trees: int) -> list[tuple[str, str, Path | None, str]]:
+    """What `sparse_tree` is given for the trees of a folder in all their conditions, or for so many built-in ones."""
     if folder is None:
-        return [SparseTree(str(seed), condition) for condition in CONDITIONS for seed in range(trees)]
+        return [(str(seed), condition, None, up) for condition in CONDITIONS for seed in range(trees)]
     found = []
     for path in sorted(folder.glob("*.npz")):
         with np.load(path) as archive:
-            found += [SparseTree(path.stem, it, path, up) for it in CONDITIONS if it in archive.files]
-    return sorted(found, key=lambda tree: CONDITIONS.index(tree.condition))
+            found += [(path.stem, condition, path, up) for condition in CONDITIONS if condition in archive.files]
+    return sorted(found, key=lambda tree: CONDITIONS.index(tree[1]))
 
 
 def builtin(seed: int, condition: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -109,29 +83,8 @@ def solid(seed: int, condition: str) -> samples.Sample:
     return samples.Sample(seen.points + noise, seen.nodes, seen.edges, seen.radii, seen.name)
 
 
-@dataclass(frozen=True)
-class Scan:
-    """A tree with a surface as a lidar saw it, in metres."""
-
-    points: np.ndarray
-    tree: samples.Sample
-    scanners: int
-    noise: float
-    density: float
-
-    @property
-    def stem_diameter(self) -> float:
-        """1.3 m above the ground, which is z = 0."""
-        return float(np.interp(BREAST_HEIGHT, self.tree.nodes[:7, 2], 2 * self.tree.radii[:7]))
-
-    @property
-    def volume(self) -> float:
-        """Above the ground."""
-        return volume(self.tree) - 2 / 3 * np.pi * float(self.tree.radii[0]) ** 3
-
-
-def scan(seed: int) -> Scan:
-    """A tree of 8 to 15 m and 15 to 50 cm, drawn at random, and what one to three scanners 8 to 20 m away see of it.
+def scan(seed: int) -> tuple[samples.Sample, np.ndarray, int]:
+    """A tree of 8 to 15 m and 15 to 50 cm, what scanners 8 to 20 m away see of it, and how many: one to three.
 
     A point is as probable as the surface faces the scanner. Its range has 2 to 5 mm of noise and its ray that of a beam
     3 mm wide that widens by 0.3 mrad. Of grazing ones a tenth fly up to 20 cm behind the edge, and a hundred points of
@@ -162,7 +115,7 @@ def scan(seed: int) -> Scan:
         fly = (faces[seen] < 0.15) & (rng.random(len(seen)) < 0.1)
         ranges = away + noise * rng.normal(size=len(seen)) + fly * rng.uniform(0, 0.2, len(seen))
         found.append(place + ranges[:, None] * unit(rays))
-    return Scan(np.concatenate(found), tree, scanners, noise, density)
+    return tree, np.concatenate(found), scanners
 
 
 def volume(tree: samples.Sample, n: int = 4_000_000) -> float:
@@ -271,45 +224,31 @@ def score(points: np.ndarray, axis: Skeleton, found: Skeleton) -> dict[str, floa
     )
 
 
-def measure_curve(tree: SparseTree, tool: Peer) -> dict:
+def measure_curve(tree: tuple[str, str, Path | None, str], tool: Peer) -> dict:
     """One skeleton against its axis."""
-    points, nodes, edges = tree.load()
+    points, nodes, edges = sparse_tree(*tree)
     found, cpu = tool.timed(points)
     return dict(cpu=cpu, points=len(points)) | score(points, skeleton_of(nodes, edges), found)
 
 
 def curve_tables(rows: list[dict]) -> Tables:
-    """F1 in every condition at a glance, and then a table for each condition."""
-    by_condition, by_tool, lines = grouped(rows, "condition"), grouped(rows, "tool"), []
-    for tool, here in by_tool.items():
-        means = [mean(pick(here, condition=it)) for it in by_condition]
-        whole = sum(row.get("components") == 1 and row.get("loops") == 0 for row in here)
-        clean = [number(means[0][key], 2) for key in ("accuracy", "completeness", "tips", "cpu")]
-        cells = [*(number(it["f1"], 2) for it in means), f"{whole}/{len(here)}", *clean]
-        lines.append([TOOLS[tool].label, *cells, failed(here)])
-    header = ["", *by_condition, "one tree", "accuracy %", "completeness %", "tips", "CPU s", "failed"]
-    first, trees = next(iter(by_condition)), len(grouped(rows, "tree"))
-    tables = [(f"F1 of {trees} sparse trees, and more of the {first} ones", header, lines)]
-    header = ["", "f1", "precision", "recall", "accuracy %", "completeness %", "components", "loops", "tips", "failed"]
-    digits = dict(f1=2, precision=2, recall=2, accuracy=2, completeness=2, components=1, loops=1, tips=2)
-    for condition, those in by_condition.items():
-        lines = []
-        for tool, here in grouped(those, "tool").items():
-            it = mean(here)
-            lines.append([TOOLS[tool].label, *(number(it[key], n) for key, n in digits.items()), failed(here)])
-        tables.append((condition, header, lines))
-    return tables
+    """F1 in every condition at a glance, and more of the first one."""
+    conditions, lines = list(grouped(rows, "condition")), []
+    for tool, here in grouped(rows, "tool").items():
+        f1 = [number(mean(pick(here, condition=it), "f1"), 2) for it in conditions]
+        whole = sum(row["components"] == 1 and row["loops"] == 0 for row in good(here))
+        first = pick(here, condition=conditions[0])
+        more = [number(mean(first, key), 2) for key in ("accuracy", "completeness", "tips", "cpu")]
+        failed = [f"{row['tree']} {row['condition']} ({row['failure']})" for row in here if "failure" in row]
+        lines.append([TOOLS[tool].label, *f1, f"{whole}/{len(here)}", *more, ", ".join(failed)])
+    header = ["", *conditions, "one tree", "accuracy %", "completeness %", "tips", "CPU s", "failed"]
+    return [(f"F1 of {len(grouped(rows, 'tree'))} sparse trees, and more of the {conditions[0]} ones", header, lines)]
 
 
-def mean(rows: list[dict]) -> dict[str, float]:
+def mean(rows: list[dict], key: str) -> float:
     """Over the trees that gave a skeleton."""
-    known = good(rows)
-    return {key: fmean(row[key] for row in known) if known else float("nan") for key in CURVE_MEASURES}
-
-
-def failed(rows: list[dict]) -> str:
-    """Which failed, and how."""
-    return ", ".join(f"{row['tree']} {row['condition']} ({row['failure']})" for row in rows if "failure" in row)
+    known = [row[key] for row in good(rows)]
+    return fmean(known) if known else float("nan")
 
 
 def measure_tree(seed: int, condition: str) -> dict[str, float]:
@@ -317,7 +256,7 @@ def measure_tree(seed: int, condition: str) -> dict[str, float]:
     drawn = solid(seed, condition)
     skeleton = pipelines.tree()(drawn.points)
     found = tree_measures(skeleton)
-    stem = np.interp(BREAST_HEIGHT + drawn.points[:, 2].min(), drawn.nodes[:7, 2], 2 * drawn.radii[:7])
+    stem = diameter_at(drawn, BREAST_HEIGHT + drawn.points[:, 2].min())
     nearest = cKDTree(drawn.nodes).query(skeleton.vertices)[1]
     true = dict(
         volume=(cylinders(skeleton).volume.sum(), volume(drawn)),
@@ -329,13 +268,21 @@ def measure_tree(seed: int, condition: str) -> dict[str, float]:
 
 
 def measure_stem(seed: int) -> dict[str, float]:
-    """Diameter and volume of a scanned tree, as found and as they are."""
-    scanned = scan(seed)
-    found = tree_measures(pipelines.tree()(scanned.points))
-    said = dict(stem_diameter=found.stem_diameter, stem_arc=found.stem_arc, volume=sum(found.volume))
-    true = dict(true_diameter=scanned.stem_diameter, true_volume=scanned.volume)
-    more = dict(height=found.height, noise=scanned.noise, doubts=len(found.doubts))
-    return said | true | more | dict(scanners=scanned.scanners, density=scanned.density)
+    """Diameter and volume of a scanned tree, as found and as they are above the ground, which is z = 0."""
+    tree, points, scanners = scan(seed)
+    found = tree_measures(pipelines.tree()(points))
+    return dict(
+        scanners=scanners,
+        stem_diameter=found.stem_diameter,
+        true_diameter=diameter_at(tree, BREAST_HEIGHT),
+        volume=sum(found.volume),
+        true_volume=volume(tree) - 2 / 3 * np.pi * float(tree.radii[0]) ** 3,
+    )
+
+
+def diameter_at(tree: samples.Sample, height: float) -> float:
+    """That of the true stem, whose nodes are the first."""
+    return float(np.interp(height, tree.nodes[:7, 2], 2 * tree.radii[:7]))
 
 
 def measure_model(cloud: Path, model: Path, unit: float) -> dict:
@@ -348,47 +295,32 @@ def measure_model(cloud: Path, model: Path, unit: float) -> dict:
 
 def model_tables(rows: list[dict]) -> Tables:
     """A line for each tree: ours and theirs."""
-
-    def cells(row):
-        return [f"{it:.3g}" for name in ("height", "stem_diameter", "volume") for it in row[name]]
-
-    lines = cells_of(rows, ["tree"], cells, 6)
-    for line, row in zip(lines, rows, strict=True):
-        line[-1] = line[-1] or "; ".join(row["doubts"])
-    header = ["", "height m", "theirs", "stem m", "theirs", "volume m3", "theirs", "doubts"]
+    lines = []
+    for row in rows:
+        pairs = [row.get(name, ("-", "-")) for name in ("height", "stem_diameter", "volume")]
+        cells = [it if isinstance(it, str) else f"{it:.3g}" for pair in pairs for it in pair]
+        lines.append([row["tree"], *cells, row.get("failure") or "; ".join(row["doubts"])])
+    header = ["", "height m", "theirs", "stem m", "theirs", "volume m3", "theirs", "note"]
     return [("Scanned trees, and cylinder models of them", header, lines)]
 
 
 def stem_tables(rows: list[dict]) -> Tables:
-    """Good diameters and volumes by seeds and scanners; and a line for each tree."""
+    """Good diameters and volumes by seeds and scanners."""
     lines = []
-    for seeds, here in grouped(rows, "seeds").items():
-        sets = [(f"{seeds} seeds, {n} scanner{'s' * (n > 1)}", pick(good(here), scanners=n)) for n in (1, 2, 3)]
-        for label, some in (*sets, (f"{seeds} seeds, all", good(here))):
-            if some:
-                lines.append([label, *_stem_cells(some)])
-
-    def cells(row):
-        stem = [f"{100 * row[it]:.2f}" for it in ("true_diameter", "stem_diameter")]
-        wood = [f"{row[it]:.3f}" for it in ("true_volume", "volume")]
-        return [str(row["scanners"]), *stem, f"{row['stem_arc']:.0f}", *wood]
-
+    for seeds, here in grouped(good(rows), "seeds").items():
+        for n in (1, 2, 3):
+            if some := pick(here, scanners=n):
+                lines.append([f"{seeds} seeds, {n} scanner{'s' * (n > 1)}", *stem_cells(some)])
+        lines.append([f"{seeds} seeds, all", *stem_cells(here)])
     header = ["", "trees", "within 3 %", "median error %", "volume: median error %"]
-    heads = ["seeds", "tree", "scanners", "true cm", "found cm", "arc", "true m3", "found m3", "note"]
-    return [
-        ("Stem diameters at 1.3 m, and volumes, of scanned trees", header, lines),
-        ("Each tree", heads, cells_of(rows, ["seeds", "tree"], cells, 6)),
-    ]
+    return [("Stem diameters at 1.3 m, and volumes, of scanned trees", header, lines)]
 
 
-def _stem_cells(rows):
+def stem_cells(rows: list[dict]) -> list[str]:
     """How good the diameters and volumes of some trees are."""
-    stem, wood = (
-        np.abs([row[said] / row[true] - 1 for row in rows])
-        for said, true in (("stem_diameter", "true_diameter"), ("volume", "true_volume"))
-    )
-    shares = [f"{(stem < 0.03).sum()}", f"{100 * np.nanmedian(stem):.2f}", f"{100 * np.median(wood):.1f}"]
-    return [str(len(rows)), *shares]
+    stem = np.abs([row["stem_diameter"] / row["true_diameter"] - 1 for row in rows])
+    wood = np.abs([row["volume"] / row["true_volume"] - 1 for row in rows])
+    return [f"{len(rows)}", f"{(stem < 0.03).sum()}", f"{100 * np.nanmedian(stem):.2f}", f"{100 * np.median(wood):.1f}"]
 
 
 def measure_tables(rows: list[dict]) -> Tables:
@@ -398,34 +330,24 @@ def measure_tables(rows: list[dict]) -> Tables:
         known = good(here)
         for name in TREE_MEASURES if known else ():
             errors = 100 * np.array([row[name] for row in known])
-            low, middle, high = np.quantile(errors, [0.25, 0.5, 0.75])
+            low, median, high = np.quantile(errors, [0.25, 0.5, 0.75])
             size = np.abs(errors)
-            cells = [f"{np.median(size):.1f}", f"{middle:+.1f} ({low:+.1f} to {high:+.1f})", f"{size.max():.1f}"]
+            cells = [f"{np.median(size):.1f}", f"{median:+.1f} ({low:+.1f} to {high:+.1f})", f"{size.max():.1f}"]
             lines.append([f"{condition}: {name.replace('_', ' ')}", *cells, f"{len(here) - len(known)}"])
-    trees = len({row["tree"] for row in rows})
     header = ["", "median size", "median (quartiles)", "largest", "failures"]
-    return [(f"Errors of {trees} trees, in percent", header, lines)]
+    return [(f"Errors of {len(grouped(rows, 'tree'))} trees, in percent", header, lines)]
 
 
-def once(path: Path, pipeline: str) -> dict:
+def measure_scan(path: Path, pipeline: str) -> dict:
     """One run on a saved scan, to be made in a fresh process."""
-    points = np.load(path)
     name, options = PIPELINES[pipeline]
-    chosen = named_pipeline(name).with_options(options)
-    reset_peak()
-    before, start = resident(), (time.process_time(), time.perf_counter())
-    skeleton = chosen(points)
-    facts = dict(cpu=time.process_time() - start[0], wall=time.perf_counter() - start[1], peak=(peak() - before) / MB)
+    skeleton, costs = once(named_pipeline(name).with_options(options), np.load(path))
     counts = dict(components=skeleton.n_components, loops=skeleton.n_loops, tips=len(skeleton.leaves))
-    return facts | counts | dict(traced=skeleton.report.n_traced)
+    return costs | counts | dict(traced=skeleton.report.n_traced)
 
 
 def large_tables(rows: list[dict]) -> Tables:
     """A line for each size and pipeline."""
-
-    def cells(row):
-        costs = [short(row[key]) for key in ("cpu", "wall", "peak")]
-        return [*costs, *(str(row[key]) for key in ("components", "loops", "tips", "traced"))]
-
-    header = ["", "points", "CPU s", "wall s", "MB", "components", "loops", "tips", "traced", "note"]
-    return [("Lidar scans of one tree", header, cells_of(rows, ["pipeline", "n"], cells, 7))]
+    columns = {"": "pipeline", "points": "n", "CPU s": brief("cpu"), "wall s": brief("wall"), "MB": brief("peak")}
+    columns |= {name: name for name in ("components", "loops", "tips", "traced")}
+    return [table("Lidar scans of one tree", rows, columns)]

@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 from glsk_o3d import samples, skeletonize
 from glsk_o3d.analysis import GraspCandidates, grasp_candidates
 
-from .runs import Jobs, application, run, study
+from .runs import Jobs, Output, Page, application, publish, run
 from .tables import Tables, good, pick
 
 NOISE = 0.005  # standard deviation, as a share of the diagonal
@@ -202,14 +202,16 @@ def tables(rows: list[dict]) -> Tables:
     return [(f"Of the best {BEST}, with a finger or the palm in the object (of all found)", header, lines)]
 
 
-@study(app, tables, "pierced", where=True)
+@app.command()
 def pierced(
     shapes: Annotated[str, typer.Option("--shapes", metavar="NAMES", help="With commas; else all.")] = ",".join(NAMES),
     points: Annotated[int, typer.Option("--points", min=100)] = 8192,
     draws: Annotated[int, typer.Option("--draws", min=1, help="Clouds of each object and condition.")] = 1,
     jobs: Jobs = 2,
-) -> list[dict]:
+    output: Output = None,
+    page: Page = None,
+) -> None:
     """The best grasps against what is inside the object: without and with a look at its points."""
     cases = product(shapes.split(","), CONDITIONS, range(draws))
     work = [(dict(shape=it, condition=how, seed=seed), (it, how, points, seed)) for it, how, seed in cases]
-    return run(measure, work, jobs)
+    publish(run(measure, work, jobs), tables, output, page, "pierced")

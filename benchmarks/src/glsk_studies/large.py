@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import tempfile
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import numpy as np
 
 from glsk_o3d import Skeleton, read_cloud, read_skeleton, save_skeleton, skeletonize
 from glsk_o3d.analysis.curves import distances
-from glsk_o3d.interop.packages import import_open3d, require
+from glsk_o3d.interop.packages import require
 from glsk_o3d.io.formats import ply
 from glsk_o3d.pipelines import default
 from glsk_o3d.samples import sauropod
@@ -20,8 +19,8 @@ from glsk_o3d.samples import sauropod
 from .clouds import builtin, cases
 from .runs import run
 from .stages import counts_of
-from .stopwatch import MB, fresh_python, peak, reset_peak, resident
-from .tables import Tables, cells_of, number, short
+from .stopwatch import fresh_python, once
+from .tables import Tables, brief, fixed, table
 
 STEP = 0.001  # between the places of a curve at which `large` measures it, as a share of the diagonal
 HUGE_BLOCK = 1_000_000  # points written at a time
@@ -50,15 +49,11 @@ def spent(work: str, cloud: Path, *words: str | Path) -> dict[str, float]:
     return json.loads(told.read_text()) | dict(file_wall=wall)
 
 
-def once(path: Path, file: bool) -> dict:
+def measure(path: Path, file: bool) -> dict:
     """One run of `default` on a saved cloud, to be made in a fresh process; its curve is saved beside the cloud."""
-    reset_peak()
-    before = resident()
     points = np.load(path)
-    start = time.process_time(), time.perf_counter()
-    skeleton = default()(points)
-    costs = dict(cpu=time.process_time() - start[0], wall=time.perf_counter() - start[1])
-    facts = costs | dict(peak=(peak() - before) / MB, sampled=skeleton.report.n_sampled) | counts_of(skeleton)
+    skeleton, costs = once(default(), points)
+    facts = costs | dict(sampled=skeleton.report.n_sampled) | counts_of(skeleton)
     facts["diagonal"] = float(np.linalg.norm(np.ptp(points, axis=0)))
     curve = Skeleton(skeleton.vertices, skeleton.edges, skeleton.radii, (), (), ())
     save_skeleton(curve, path.with_suffix(".json"))
@@ -81,9 +76,12 @@ def measure_large(sizes: list[int], shapes: str, file: bool, jobs: int) -> list[
         with tempfile.TemporaryDirectory() as folder:
             paths = {n: Path(folder, f"{n}.npy") for n in sizes}
             for n, path in paths.items():
-                save_cloud(path, builtin(shape, f"clean_{n}")[0], file)
+                points = builtin(shape, f"clean_{n}")[0]
+                np.save(path, points)
+                if file:
+                    ply.save(path.with_suffix(".ply"), {"positions": points})
             work = [(dict(measure="large", n=n, shape=shape), (path, file)) for n, path in paths.items()]
-            here = run(once, work, min(jobs, 1), fresh=True)
+            here = run(measure, work, min(jobs, 1), fresh=True)
             base = here[0]
             for row in here[1:]:
                 if "failure" not in row and "failure" not in base:
@@ -94,32 +92,16 @@ def measure_large(sizes: list[int], shapes: str, file: bool, jobs: int) -> list[
     return rows
 
 
-def save_cloud(path: Path, points: np.ndarray, file: bool) -> None:
-    """As an array, and where asked for as PLY beside it."""
-    np.save(path, points)
-    if file:
-        o3d = import_open3d()
-        cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
-        if not o3d.io.write_point_cloud(str(path.with_suffix(".ply")), cloud):
-            raise OSError(f"{path.with_suffix('.ply')} could not be written: is the disk full?")
-
-
 def large_tables(rows: list[dict]) -> Tables:
     """A line for each shape and size."""
-    files = any("file_cpu" in row for row in rows)
-    header = ["", "points", "CPU s", "MB", "sampled", "contracted", "vertices", "mean %", "largest %", "loops", "same"]
-    header += ["file CPU s", "file wall s", "file MB"] if files else []
-
-    def cells(row):
-        counts = [str(row[key]) for key in ("sampled", "contracted", "vertices")]
-        away = [number(row.get(key), 2) for key in ("mean", "most")]
-        same = {True: "yes", False: "no", None: "-"}[row.get("same_loops")]
-        found = [short(row["cpu"]), number(row["peak"], 0), *counts, *away, str(row["loops"]), same]
-        more = [short(row["file_cpu"]), short(row["file_wall"]), number(row["file_peak"], 0)] if files else []
-        return found + more
-
-    lines = cells_of(rows, ["shape", "n"], cells, len(header) - 2)
-    return [(f"default, against {min(row['n'] for row in rows)} points", [*header, "note"], lines)]
+    columns = {"": "shape", "points": "n", "CPU s": brief("cpu"), "MB": fixed("peak", 0)}
+    columns |= {name: name for name in ("sampled", "contracted", "vertices")}
+    columns |= {"mean %": fixed("mean"), "largest %": fixed("most"), "loops": "loops"}
+    columns |= {"same": lambda row: "yes" if row["same_loops"] else "no"}
+    if any("file_cpu" in row for row in rows):
+        columns |= {"file CPU s": brief("file_cpu"), "file wall s": brief("file_wall")}
+        columns |= {"file MB": fixed("file_peak", 0)}
+    return [table(f"default, against {min(row['n'] for row in rows)} points", rows, columns)]
 
 
 def noisy_blocks(n: int, seed: int = 0) -> Iterator[np.ndarray]:
@@ -191,12 +173,8 @@ def shape(skeleton: Skeleton) -> dict[str, int]:
 
 def huge_tables(rows: list[dict]) -> Tables:
     """A line for each file."""
-    header = ["", "points", "file GB", "CPU s", "wall s", "MB", "vertices", "components", "loops", "ends"]
-    lines = []
-    for row in rows:
-        seconds = [short(row[key]) if key in row else "-" for key in ("file_cpu", "file_wall")]
-        size, most = number(row.get("size"), 2), number(row.get("file_peak"), 0)
-        counts = [str(row.get(key, "-")) for key in ("vertices", "components", "loops", "ends")]
-        away = [number(row.get(key), 2) for key in ("mean", "most")]
-        lines.append([row["file"], str(row["n"]), size, *seconds, most, *counts, *away])
-    return [("from disk to disk", [*header, "mean %", "largest %"], lines)]
+    columns = {"": "file", "points": "n", "file GB": fixed("size"), "CPU s": brief("file_cpu")}
+    columns |= {"wall s": brief("file_wall"), "MB": fixed("file_peak", 0)}
+    columns |= {name: name for name in ("vertices", "components", "loops", "ends")}
+    columns |= {"mean %": fixed("mean"), "largest %": fixed("most")}
+    return [table("from disk to disk", rows, columns, note=False)]

@@ -25,12 +25,11 @@ from glsk_o3d.interop.clouds import cloud_points
 from . import board
 from .board import Entry, kept, repeats, seconds
 from .peers import PEERS, Peer, installed, one_thread, silence, skeleton_of
-from .runs import application, writable
+from .runs import Jobs, application, writable
 from .runs import run as in_processes
-from .tables import ROOT, Table, fill, machine, markdown_table, number, read, surroundings
+from .tables import ROOT, Table, fill, machine, markdown, number, read, surroundings
 
 BENCH = "bench"  # the clouds, in the folder that a run is given; beside it a folder of answers for each tool
-OBJECTS = "repeat"  # several clouds of each object, and answers to these, in the same way
 TIMED = ("clean", "depth2")  # of the first shape of each family
 KEPT_AFTER = 20  # skeletons, so that little is lost when a run is stopped
 # imported by all processes at once, since that takes longer than some skeletons
@@ -57,12 +56,6 @@ Place = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the clouds
 Tool = Annotated[str, typer.Option("--tool", metavar="NAMES", help="With commas; else all that are installed.")]
 Version = Annotated[str, typer.Option("--version", metavar="NAME", help="Of the benchmark.")]
 Limit = Annotated[float, typer.Option("--limit", help="Seconds for a skeleton.")]
-Jobs = Annotated[int, typer.Option("--jobs", min=1, help="Processes at once.")]
-Retry = Annotated[bool, typer.Option("--retry", help="Run again what failed.")]
-There = Annotated[bool, typer.Option("--there", help="Run nothing: take the answers that are there.")]
-
-
-Part = Annotated[bool, typer.Option("--part", help="Take DIR/bench as it is, though it lacks shapes or variants.")]
 
 
 @app.command("run")
@@ -71,15 +64,13 @@ def run_(
     tool: Tool = "",
     limit: Limit = 60.0,
     jobs: Jobs = 2,
-    retry: Retry = False,
-    there: There = False,
     version: Version = "v1",
-    part: Part = False,
+    part: Annotated[bool, typer.Option("--part", help="Take DIR/bench as it is, though it lacks some clouds.")] = False,
 ) -> None:
     """Run tools over the whole benchmark, or go on where it was left, and keep their scores in benchmarks/VERSION."""
-    peers = with_answers(place, tool) if there else installed(PEERS, tool)
+    peers = installed(PEERS, tool)
     bench = read_folder(place / BENCH) if part else make(place / BENCH, version, jobs=jobs)
-    for name, made in found_in(place, peers) if there else answered(bench, place, peers, limit, jobs, retry):
+    for name, made in answered(bench, place, peers, limit, jobs):
         results = score_answers(bench, place / name, name=name)
         typer.echo(f"{board.keep_scores(results, made)}: {results.failures} failures")
 
@@ -92,46 +83,27 @@ def repeat_(
     draws: Annotated[int, typer.Option("--draws", min=2, help="Clouds of each object.")] = 5,
     limit: Limit = 60.0,
     jobs: Jobs = 2,
-    retry: Retry = False,
-    there: There = False,
     version: Version = "v2",
 ) -> None:
     """Run tools over several clouds of each object, and keep how far their answers are apart in benchmarks/VERSION."""
     objects = "things" if meshes is None else "meshes"
-    folder = place / f"{OBJECTS}_{objects}"
-    peers = with_answers(folder, tool) if there else installed(PEERS, tool)
+    folder, peers = place / f"repeat_{objects}", installed(PEERS, tool)
     bench = sample(folder / BENCH, meshes, version=version, draws=draws)
-    for name, made in found_in(folder, peers) if there else answered(bench, folder, peers, limit, jobs, retry):
+    for name, made in answered(bench, folder, peers, limit, jobs):
         found = repeat(bench, folder / name, name=name)
         where = board.keep_repeat(version, objects, found, made)
         moved, failures = (found.means()[it] for it in ("moved", "failures"))
         typer.echo(f"{where}: {name}: moved {number(moved)}, {failures} failures")
 
 
-def with_answers(place: Path, names: str) -> dict[str, Peer]:
-    """The tools of these names, with commas, of which there are answers; for no names all."""
-    wanted = names.split(",") if names else [name for name in PEERS if (place / name).is_dir()]
-    if not wanted or (absent := [name for name in wanted if name not in PEERS or not (place / name).is_dir()]):
-        raise typer.BadParameter(f"{place} has no answers of {', '.join(absent) if wanted else 'any tool'}")
-    return {name: PEERS[name] for name in wanted}
-
-
-def found_in(place: Path, peers: Mapping[str, Peer]) -> Iterator[tuple[str, dict]]:
-    """Tools of which there are answers, and what these were made with, if that is known."""
-    for name, peer in peers.items():
-        times = place / name / TIMES_NAME
-        told = read(times).get("made") if times.is_file() else None
-        yield name, told or {"commit": None, "packages": peer.versions(), "limit": None}
-
-
 def answered(
-    bench: BenchmarkFolder, place: Path, peers: Mapping[str, Peer], limit: float, jobs: int, retry: bool
+    bench: BenchmarkFolder, place: Path, peers: Mapping[str, Peer], limit: float, jobs: int
 ) -> Iterator[tuple[str, dict]]:
     """Run tools over all clouds, or go on; gives the name of each, when all are done, and what it was made with."""
     one_thread()
     for name, peer in peers.items():
         made, times = begun(place / name, peer, limit)
-        todo = [it for it in bench.scored if it.name not in times or (retry and times[it.name]["failure"])]
+        todo = [it for it in bench.scored if it.name not in times]
         for first in range(0, len(todo), KEPT_AFTER):
             some = todo[first : first + KEPT_AFTER]
             work = [(dict(cloud=it.name), (it.path, peer, place / name / f"{it.name}.npz")) for it in some]
@@ -236,7 +208,7 @@ def pieces(version: str, entries: list[Entry], rows: list[dict]) -> dict[str, st
         }
     found |= {name: board.repeated(it) for name, objects in REPEATED.items() if (it := repeats(version, objects))}
     prefix = "" if version == "v1" else "things-"
-    told = {f"{prefix}{name}": markdown_table(*table) for name, table in found.items()}
+    told = {f"{prefix}{name}": markdown([table]) for name, table in found.items()}
     if entries:
         where = {it["where"]: None for it in cpu.values()}
         told[f"{prefix}leaderboard"] += "".join(f"\nCPU seconds: {it}\n" for it in where)

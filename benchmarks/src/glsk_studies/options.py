@@ -6,7 +6,6 @@ Means over several draws of the points, of the default pipeline but for what is 
 from __future__ import annotations
 
 from itertools import chain
-from pathlib import Path
 from typing import Annotated
 
 import numpy as np
@@ -17,10 +16,9 @@ from glsk_o3d.analysis import compare
 from glsk_o3d.cli.overrides import override
 from glsk_o3d.pipelines import default
 
-from .runs import Jobs, Output, run
-from .tables import Tables, fill, number, page_with, pick, present, save
+from .runs import FirstPage, Jobs, Output, application, run
+from .tables import Tables, fill, number, pick, present, save
 
-PARTS = ("spurs", "radii", "spacing")  # of the page
 NOISE = dict(noise=0.01)
 CLOUDS = {
     "`torus`": (samples.torus, {}),
@@ -49,7 +47,7 @@ NEIGHBOURS = {"`default`": "", "`k=24`": "RingBuilder.k=24", "`k=32`": "RingBuil
 CURVES = ["`torus`", "`helix`", "`helix`, 1 % noise", "`y_junction`", "animal, two cameras"]
 SPACING = {f"`spacing={value}`": f"Refiner.spacing={value}" for value in (0.25, 0.5, 1)}
 
-app = typer.Typer(help=__doc__, pretty_exceptions_enable=False, rich_markup_mode=None, add_completion=False)
+app = application(None)
 
 
 def measure(cloud: str, settings: str, seed: int) -> dict:
@@ -60,12 +58,6 @@ def measure(cloud: str, settings: str, seed: int) -> dict:
     found = compare(skeleton, sample)
     facts = {name: getattr(found, name) for name in ("error", "radius_error", "ends", "leaves", "topology")}
     return dict(facts, vertices=len(skeleton.vertices))
-
-
-def wanted() -> list[tuple[str, str]]:
-    """Clouds and settings of all tables, each once."""
-    pairs = [(ANIMALS, SPURS), (RADII, NEIGHBOURS), (CURVES, SPACING)]
-    return list(dict.fromkeys((cloud, it) for clouds, options in pairs for cloud in clouds for it in options.values()))
 
 
 def tables(rows: list[dict]) -> dict[str, Tables]:
@@ -99,19 +91,20 @@ def tables(rows: list[dict]) -> dict[str, Tables]:
 
 @app.command()
 def options(
-    page: Annotated[Path | None, typer.Argument(callback=page_with(*PARTS), help="Where to put the tables.")] = None,
+    page: FirstPage = None,
     draws: Annotated[int, typer.Option("--draws", min=1, help="Of the points of every sample.")] = 6,
     jobs: Jobs = 2,
     output: Output = None,
 ) -> None:
     """Measure, print the tables, and put them into a page."""
+    pairs = [(ANIMALS, SPURS), (RADII, NEIGHBOURS), (CURVES, SPACING)]
+    wanted = dict.fromkeys((cloud, it) for clouds, settings in pairs for cloud in clouds for it in settings.values())
     seeds = range(draws)
-    work = [(dict(cloud=cloud, settings=it), (cloud, it, seed)) for cloud, it in wanted() for seed in seeds]
-    rows = run(measure, work, jobs)
+    rows = run(measure, [(dict(cloud=it[0], settings=it[1]), (*it, seed)) for it in wanted for seed in seeds], jobs)
     if failed := [row for row in rows if "failure" in row]:
         raise SystemExit(f"{failed[0]['cloud']} with {failed[0]['settings'] or 'no settings'}: {failed[0]['failure']}")
     save(output, rows)
     found = tables(rows)
-    present([*chain(*found.values())], markdown=page is None)
+    present([*chain(*found.values())])
     if page is not None:
         fill(page, found)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
@@ -248,12 +248,6 @@ def installed(known: Mapping[str, Peer], names: str) -> dict[str, Peer]:
             raise typer.BadParameter(said)
         typer.echo(said, err=True)
     return there
-
-
-def versions(tools: Iterable[Peer]) -> str:
-    """A line with the packages of other tools."""
-    found = {name: it for tool in tools for name, it in tool.versions().items()}
-    return ", ".join(f"{name} {it}" for name, it in found.items())
 
 
 def one_thread() -> None:

@@ -7,6 +7,7 @@ import os
 import tempfile
 import time
 import warnings
+from collections.abc import Callable
 from functools import partial
 from itertools import product
 from multiprocessing import get_context
@@ -26,7 +27,7 @@ from .clouds import builtin
 from .runs import named, run
 from .stages import timed
 from .stopwatch import fresh_python, in_turns, yardstick
-from .tables import Tables, cells_of, number, short
+from .tables import Tables, brief, number, table
 
 FRAMES, TURN = 30, 60.0  # of a camera, and the degrees that it turns by around the scene meanwhile
 CAMERA_HEIGHT = 20.0  # degrees
@@ -44,6 +45,7 @@ spent = dict(import_wall=imported[0] - start[0], import_cpu=imported[1] - start[
 print(json.dumps(dict(spent, first_wall=done[0] - begun[0], first_cpu=done[1] - begun[1])))
 """
 """A fresh process: what the import and the first call take."""
+COLD_FACTS = {"import": "import", "first call": "first", "process": "process"}
 
 
 def first_and_next(path: Path, pipeline: str, repeat: int, threads: int) -> dict:
@@ -54,7 +56,7 @@ def first_and_next(path: Path, pipeline: str, repeat: int, threads: int) -> dict
             spent, wall = fresh_python(COLD, path, pipeline)
             found.append(json.loads(spent) | dict(process_wall=wall))
         cold = {name: median(each[name] for each in found) for name in found[0]}
-        return cold | timed(path, named(pipeline), repeat)[pipeline]
+        return cold | timed(path, named(pipeline)[pipeline], repeat)
 
 
 def measure_rate(sizes: list[int], pipelines: list[str], shape: str, repeat: int, jobs: int) -> list[dict]:
@@ -73,14 +75,16 @@ def measure_rate(sizes: list[int], pipelines: list[str], shape: str, repeat: int
 
 def rate_tables(rows: list[dict]) -> Tables:
     """Cold and warm."""
-    header = ["", "points", "threads", "1 kNN ms", "import ms", "first call ms", "process ms"]
-    header += ["next call ms", "CPU ms", "per second", "first process per second", "note"]
-    keys = ("knn_wall", "import_wall", "first_wall", "process_wall", "wall", "cpu")
+    columns = {"": "pipeline", "points": "n", "threads": "threads", "1 kNN ms": brief("knn_wall", 1000)}
+    columns |= {f"{what} ms": brief(f"{fact}_wall", 1000) for what, fact in COLD_FACTS.items()}
+    columns |= {"next call ms": brief("wall", 1000), "CPU ms": brief("cpu", 1000), "per second": per_second("wall")}
+    columns |= {"first process per second": per_second("process_wall")}
+    return [table("skeletons per second, wall time", rows, columns)]
 
-    def cells(row):
-        return [*(short(1000 * row[key]) for key in keys), *(number(1 / row[it], 1) for it in ("wall", "process_wall"))]
 
-    return [("skeletons per second, wall time", header, cells_of(rows, ["pipeline", "n", "threads"], cells, 8))]
+def per_second(fact: str) -> Callable[[dict], str]:
+    """A column of how often what takes so many seconds can be done in one."""
+    return lambda row: number(1 / row[fact], 1)
 
 
 def frames(family: str, seed: int, n: int) -> list[np.ndarray]:
@@ -118,10 +122,8 @@ def measure_stream(sizes: list[int], families: list[str], repeat: int) -> list[d
 
 def stream_tables(rows: list[dict]) -> Tables:
     """Frames per second of streams."""
-    header = ["scene", "points", "workers", "1 kNN ms", "a frame ms", "frames per second", "least", "most", "same bits"]
-    lines = []
-    for row in rows:
-        rates = [number(1 / row[key], 1) for key in ("wall", "most", "least")]
-        times = (short(1000 * row[key]) for key in ("knn_wall", "wall"))
-        lines.append([row["shape"], str(row["n"]), str(row["workers"]), *times, *rates, "yes" if row["same"] else "no"])
-    return [(f"streams of {FRAMES} depth frames, wall time", header, lines)]
+    columns = {"scene": "shape", "points": "n", "workers": "workers", "1 kNN ms": brief("knn_wall", 1000)}
+    columns |= {"a frame ms": brief("wall", 1000), "frames per second": per_second("wall")}
+    columns |= {"least": per_second("most"), "most": per_second("least")}
+    columns |= {"same bits": lambda row: "yes" if row["same"] else "no"}
+    return [table(f"streams of {FRAMES} depth frames, wall time", rows, columns, note=False)]

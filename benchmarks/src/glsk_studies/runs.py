@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-import inspect
 import os
 import signal
 import warnings
@@ -12,7 +10,7 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Annotated, get_type_hints
+from typing import Annotated
 
 import typer
 from rich.console import Console
@@ -23,7 +21,7 @@ from glsk_o3d.cli.overrides import override
 from glsk_o3d.errors import InvalidParameterError
 from glsk_o3d.recipes.catalogue import named_pipeline
 
-from .tables import Tables, fill, machine, markdown_table, page_with, present, save
+from .tables import Tables, fill, machine, markdown, present, save, surroundings
 
 DEATHS = {it.value: it.name for it in signal.Signals} | {signal.SIGKILL.value: "killed, perhaps for want of memory"}
 PUBLISHED = ("wen2024", "cao2010")
@@ -43,6 +41,7 @@ def run(
     job alone, and so is more time than the limit [s]; those with modules to preload are copies of one that has loaded
     them, without a warm-up.
     """
+    surroundings()  # now: writing a page will change the working tree, and the work itself the load
     if processes == 0:
         with warnings.catch_warnings():
             _warm_up()
@@ -129,69 +128,29 @@ Jobs = Annotated[int, typer.Option("--jobs", min=0, help="Processes; 0 stays in 
 Output = Annotated[
     Path | None, typer.Option("--output", "-o", metavar="JSON", help="Write every result.", callback=writable)
 ]
-Markdown = Annotated[bool, typer.Option("--markdown", help="Print Markdown.")]
+Page = Annotated[Path | None, typer.Option("--page", exists=True, dir_okay=False, help="Put the tables there, too.")]
+FirstPage = Annotated[
+    Path | None, typer.Argument(metavar="PAGE", exists=True, dir_okay=False, help="Put the tables there, too.")
+]
+Sizes = Annotated[str, typer.Option("--sizes", metavar="NUMBERS", help="Points, with commas.")]
 Saved = Annotated[Path, typer.Argument(metavar="JSON", exists=True, dir_okay=False)]
 File = Annotated[Path, typer.Argument(metavar="PAGE", exists=True, dir_okay=False)]
-
-
-def study(
-    app: typer.Typer,
-    tables: Callable[[list[dict]], Tables],
-    part: str | Callable[[dict], str] = "",
-    page_first: bool = False,
-    where: bool = False,
-    shown: int | None = None,
-    name: str | None = None,
-):
-    """A command of a function that gives rows: these are saved, and their tables printed.
-
-    With a part, so many of the tables are also put there into a page: the option --page, or the first argument.
-    """
-
-    def decorate(function):
-        parts = [part] if isinstance(part, str) else []
-        kind = partial(typer.Argument) if page_first else partial(typer.Option, "--page")
-        page = Annotated[Path | None, kind(metavar="PAGE", help="Put tables there.", callback=page_with(*parts))]
-        more = {"output": (Output, None), "markdown": (Markdown, False)} | ({"page": (page, None)} if part else {})
-
-        @functools.wraps(function)
-        def command(page=None, output=None, markdown=False, **options):
-            measured_at = machine() if where else ""  # now, since writing the page changes the working tree
-            chosen = part if isinstance(part, str) else part(options)
-            publish(function(**options), tables, output, markdown, measured_at, page, chosen, shown)
-
-        plain = inspect.Parameter.KEYWORD_ONLY
-        added = [inspect.Parameter(it, plain, default=default, annotation=of) for it, (of, default) in more.items()]
-        given = [each.replace(kind=plain) for each in inspect.signature(function, eval_str=True).parameters.values()]
-        ordered = added[-1:] + given + added[:-1] if page_first else given + added
-        command.__signature__ = inspect.Signature(ordered)
-        del command.__wrapped__
-        command.__annotations__ = get_type_hints(function, include_extras=True) | {
-            it: of for it, (of, _) in more.items()
-        }
-        return app.command(name)(command)
-
-    return decorate
 
 
 def publish(
     rows: list[dict],
     make: Callable[[list[dict]], Tables],
     output: Path | None,
-    markdown: bool,
-    where: str = "",
     page: Path | None = None,
     part: str = "",
-    shown: int | None = None,
-) -> Tables:
-    """Save rows, print the tables that are made of them, and put so many into a part of a page; gives the tables."""
+) -> None:
+    """Save rows, and print the tables that are made of them and where they were measured, also into a page."""
     save(output, rows)
     tables = make(rows)
-    present(tables, markdown, where)
+    typer.echo(f"{machine()}\n")
+    present(tables)
     if page is not None:
-        chosen = tables[:shown]
-        fill(page, {part: "\n".join([where, "", *(markdown_table(*it) for it in chosen)]) if where else chosen})
-    return tables
+        fill(page, {part: f"{machine()}\n\n{markdown(tables)}"})
 
 
 def named(names: str) -> dict[str, Pipeline]:

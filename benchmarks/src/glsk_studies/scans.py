@@ -18,9 +18,9 @@ from glsk_o3d.interop.clouds import cloud_points
 
 from .clouds import Case, cases, folder_or
 from .runs import named, run
-from .stages import counts_of, growth, over
+from .stages import costs, counts_of, growth
 from .stopwatch import STAGES, in_turns, yardstick
-from .tables import Tables, good, grouped, number, pick, short
+from .tables import Tables, by_size, failures, good, grouped, middle, number, quartiles, short
 
 NOISE = ("noise0.1", "noise0.3", "noise1")  # of the bodies, in percent of the diagonal
 VIEWS = ("clean", "depth2", "misreg", "lidar")  # of the shapes of folders
@@ -99,17 +99,14 @@ def scan_tables(rows: list[dict]) -> Tables:
     header += ["two threads", "growth", "note"]
     lines, shares = [], []
     for kind, those in grouped(rows, "kind").items():
-        sizes = sorted({row["n"] for row in good(those)})
-        at = {n: pick(good(those), n=n) for n in sizes}
-        slope = number(growth(sizes, [over(at[n], lambda row: row["cpu"]) for n in sizes]), 2)
-        note = "; ".join(f"{row['shape']}: {row['failure']}" for row in those if "failure" in row)
+        at = by_size(good(those))
+        slope = number(growth(at, costs(at, "whole")), 2)
         for n, here in at.items():
-            knn, contracted, wall, two = (
-                over(here, lambda row, key=key: row[key]) for key in ("knn_cpu", "contracted", "wall", "wall_of_two")
-            )
-            low, middle, high = np.quantile([row["cpu"] / row["knn_cpu"] for row in here], [0.25, 0.5, 0.75])
-            cells = [kind, str(n), str(len(here)), short(1000 * knn), f"{middle:.1f} ({low:.1f} to {high:.1f})"]
-            lines.append([*cells, f"{contracted:.0f}", short(1000 * wall), short(1000 * two), slope, note])
-            parts = [over(here, lambda row, it=it: row["stages"][it]["cpu"] / row["knn_cpu"]) for it in STAGES]
+            spent = quartiles(np.array([row["cpu"] / row["knn_cpu"] for row in here]), 1)
+            cells = [kind, str(n), str(len(here)), short(1000 * middle(here, "knn_cpu")), spent]
+            cells += [f"{middle(here, 'contracted'):.0f}"]
+            cells += [short(1000 * middle(here, key)) for key in ("wall", "wall_of_two")]
+            lines.append([*cells, slope, failures(those)])
+            parts = [middle(here, lambda row, it=it: row["stages"][it]["cpu"] / row["knn_cpu"]) for it in STAGES]
             shares.append([kind, str(n), *(number(part, 2) for part in parts)])
     return [("scans, CPU", header, lines), ("of it the stages, in kNN", ["", "points", *STAGES], shares)]

@@ -7,7 +7,6 @@ The README of the benchmarks says what each command shows.
 
 from __future__ import annotations
 
-import time
 from itertools import chain
 from pathlib import Path
 from typing import Annotated
@@ -18,26 +17,12 @@ from .clouds import BUILTIN
 from .contraction import draw_figures, figure_tables, measure_figures, objects
 from .large import huge_tables, large_tables, measure_huge, measure_large
 from .rates import measure_rate, measure_stream, rate_tables, stream_tables
-from .runs import (
-    Folder,
-    Jobs,
-    Markdown,
-    Output,
-    Own,
-    Pipelines,
-    Shapes,
-    application,
-    named,
-    numbers,
-    publish,
-    study,
-)
+from .runs import FirstPage, Folder, Jobs, Output, Own, Pipelines, Shapes, Sizes, application, named, numbers, publish
 from .scans import measure_scans, scan_tables
-from .stages import draw_growth, draw_shares, measure_stages, stage_tables
-from .tables import fill, machine, page_with, present, save
+from .stages import draw_stages, measure_stages, stage_tables
+from .tables import fill, machine, present, save
 
 app = application(__doc__)
-PARTS = ("machine", "stages", "figures", "rate")  # of the page that `all` fills
 
 
 def _folder(path: Path | None) -> Path | None:
@@ -46,7 +31,6 @@ def _folder(path: Path | None) -> Path | None:
     return path
 
 
-Sizes = Annotated[str, typer.Option("--sizes", metavar="NUMBERS", help="Points, with commas.")]
 PublishedTo = Annotated[int, typer.Option("--published-to", help="wen2024 and cao2010 only up to so many points.")]
 Repeat = Annotated[int, typer.Option("--repeat", min=1, help="Runs of which medians are taken, at least.")]
 Pictures = Annotated[
@@ -66,14 +50,12 @@ def stages(
     jobs: Jobs = 2,
     pictures: Pictures = None,
     output: Output = None,
-    markdown: Markdown = False,
 ) -> None:
     """What every stage and the whole cost over the size of the cloud, and how they grow."""
     rows = measure_stages(numbers(sizes), named(pipeline), shapes, kind, published_to, repeat, jobs)
-    tables = publish(rows, stage_tables, output, markdown, machine())
+    publish(rows, stage_tables, output)
     if pictures is not None:
-        draw_growth(tables, pictures)
-        draw_shares(tables, pictures)
+        draw_stages(rows, pictures)
 
 
 @app.command()
@@ -87,43 +69,46 @@ def figures(
     jobs: Jobs = 2,
     pictures: Pictures = None,
     output: Output = None,
-    markdown: Markdown = False,
 ) -> None:
     """The contraction against the baseline (figures 4 to 6 of Wen et al. 2024), and what the difference is made of."""
     rows = measure_figures(objects(folder, own, shapes, numbers(sizes)), solves, repeat, jobs)
-    publish(rows, figure_tables, output, markdown, machine())
+    publish(rows, figure_tables, output)
     if pictures is not None:
         draw_figures(rows, pictures)
 
 
-@study(app, rate_tables, where=True)
+@app.command()
 def rate(
     sizes: Sizes = FIGURE_SIZES,
     pipeline: Pipelines = "default",
     shape: Annotated[str, typer.Option("--shape", metavar="NAME", help="A built-in shape.")] = "sauropod",
     repeat: Repeat = 3,
     jobs: Jobs = 2,
-) -> list[dict]:
+    output: Output = None,
+) -> None:
     """Skeletons per second, in a fresh process and after."""
     if shape not in BUILTIN:
         raise typer.BadParameter(f"no shape {shape}: there are {', '.join(BUILTIN)}")
-    return measure_rate(numbers(sizes), pipeline.split(","), shape, repeat, jobs)
+    publish(measure_rate(numbers(sizes), pipeline.split(","), shape, repeat, jobs), rate_tables, output)
 
 
-@study(app, stream_tables, "stream", page_first=True, where=True)
+@app.command()
 def stream(
+    page: FirstPage = None,
     sizes: Sizes = "1024,4096",
     scenes: Annotated[
         str, typer.Option("--scenes", metavar="NAMES", help="Families of random shapes.")
     ] = "figures,handles",
     repeat: Repeat = 3,
-) -> list[dict]:
+    output: Output = None,
+) -> None:
     """Thirty frames of a depth camera that turns around a scene, by one process and by one for each core."""
-    return measure_stream(numbers(sizes), scenes.split(","), repeat)
+    publish(measure_stream(numbers(sizes), scenes.split(","), repeat), stream_tables, output, page, "stream")
 
 
-@study(app, scan_tables, "scans", page_first=True, where=True)
+@app.command()
 def scans(
+    page: FirstPage = None,
     folder: Annotated[
         list[Path] | None, typer.Option("--folder", metavar="DIR", help="Scans of shapes: depth2, misreg and lidar.")
     ] = None,
@@ -131,45 +116,44 @@ def scans(
     pipeline: Annotated[str, typer.Option("--pipeline", metavar="NAME")] = "default",
     repeat: Repeat = 3,
     jobs: Jobs = 1,
-) -> list[dict]:
+    output: Output = None,
+) -> None:
     """Clouds as scanners give them: noisy bodies, scans of the shapes in folders, scanned objects."""
-    return measure_scans(folder or [], numbers(sizes), pipeline, repeat, jobs)
+    rows = measure_scans(folder or [], numbers(sizes), pipeline, repeat, jobs)
+    publish(rows, scan_tables, output, page, "scans")
 
 
-@study(app, large_tables, "large", page_first=True, where=True)
+@app.command()
 def large(
+    page: FirstPage = None,
     sizes: Sizes = "65536,1048576",
     shapes: Shapes = "",
     file: Annotated[bool, typer.Option("--file", help="Also the whole command, from a PLY file to one.")] = False,
     jobs: Jobs = 1,
-) -> list[dict]:
+    output: Output = None,
+) -> None:
     """Large clouds: what they cost, and how far their skeletons are from that of the smallest size."""
-    return measure_large(numbers(sizes), shapes, file, jobs)
+    publish(measure_large(numbers(sizes), shapes, file, jobs), large_tables, output, page, "large")
 
 
-@study(app, huge_tables, "huge", page_first=True, where=True)
+@app.command()
 def huge(
+    page: FirstPage = None,
     points: Annotated[int, typer.Option("--points", help="Of each file.")] = 100_000_000,
     against: Annotated[int, typer.Option("--against", help="Points to skeletonise in memory.")] = 1_000_000,
     endings: Annotated[str, typer.Option("--endings", help="Of the files: .ply, .las, .laz.")] = ".ply,.laz",
-    labelled: Annotated[
-        str, typer.Option("--labelled", help="Of those whose points are labelled, too: 63 bytes each.")
-    ] = "",
+    labelled: Annotated[str, typer.Option("--labelled", help="Of those whose points are labelled, too.")] = "",
     folder: Annotated[Path | None, typer.Option("--folder", help="Where the files are, or are made and stay.")] = None,
-) -> list[dict]:
+    output: Output = None,
+) -> None:
     """Clouds larger than memory: the whole command, and whether its skeleton is that of a small cloud."""
-    chosen = ([ending for ending in given.split(",") if ending] for given in (endings, labelled))
-    return measure_huge(*chosen, points, against, folder)
+    rows = measure_huge(endings.split(","), labelled.split(","), points, against, folder)
+    publish(rows, huge_tables, output, page, "huge")
 
 
 @app.command("all")
 def everything(
-    page: Annotated[
-        Path | None,
-        typer.Argument(
-            metavar="PAGE", help="Markdown page for the tables; pictures beside it.", callback=page_with(*PARTS)
-        ),
-    ] = None,
+    page: FirstPage = None,
     own: Own = False,
     sizes: Sizes = ALL_SIZES,
     figure_sizes: Annotated[
@@ -182,27 +166,20 @@ def everything(
     jobs: Jobs = 2,
     pictures: Pictures = None,
     output: Output = None,
-    markdown: Markdown = False,
 ) -> None:
-    """The three together, with their pictures."""
-    chosen, found = named(pipeline), objects(None, own, shapes, numbers(figure_sizes))
-    start, where = time.perf_counter(), machine()  # now, since writing the page changes the working tree
-
-    def done(what, rows):
-        typer.echo(f"{what} done, {time.perf_counter() - start:.0f} s so far", err=True)
-        return rows
-
-    by_stage = done("stages", measure_stages(numbers(sizes), chosen, "sauropod", "clean", published_to, repeat, jobs))
-    compared = done("figures", measure_figures(found, 4, 1, jobs))
-    fast = done("rate", measure_rate(numbers(figure_sizes), ["default"], "sauropod", repeat, jobs))
-    save(output, [*by_stage, *compared, *fast])
-    parts = {"stages": stage_tables(by_stage), "figures": figure_tables(compared), "rate": rate_tables(fast)}
+    """The first three together, with their pictures."""
+    chosen, clouds = named(pipeline), objects(None, own, shapes, numbers(figure_sizes))
+    by_stage = measure_stages(numbers(sizes), chosen, "sauropod", "clean", published_to, repeat, jobs)
+    compared = measure_figures(clouds, 4, 1, jobs)
+    rates = measure_rate(numbers(figure_sizes), ["default"], "sauropod", repeat, jobs)
+    save(output, [*by_stage, *compared, *rates])
+    parts = {"stages": stage_tables(by_stage), "figures": figure_tables(compared), "rate": rate_tables(rates)}
+    typer.echo(f"{machine()}\n")
+    present([*chain(*parts.values())])
     if pictures is None and page is not None and (page.parent / "images").is_dir():
         pictures = page.parent / "images"
     if pictures is not None:
         draw_figures(compared, pictures)
-        draw_growth(parts["stages"], pictures)
-        draw_shares(parts["stages"], pictures)
+        draw_stages(by_stage, pictures)
     if page is not None:
-        fill(page, {"machine": f"{where}\n", **parts})
-    present([*chain(*parts.values())], markdown, where)
+        fill(page, {"machine": f"{machine()}\n", **parts})

@@ -18,7 +18,7 @@ from glsk_o3d.pipelines import rings
 
 from .clouds import Case
 from .runs import with_solves
-from .tables import INK, LOOKS, Tables, cells_of, good, grouped, keep, number, pick, plain_log, sheet, summary
+from .tables import INK, LOOKS, Tables, fixed, good, grouped, keep, number, pick, plain_log, sheet, summary, table
 
 
 def feet(points, nodes, edges):
@@ -93,13 +93,12 @@ def mass_tables(rows: list[dict]) -> Tables:
     """A table per variant, with the mean over its shapes."""
     measures = [f"{kind}_{what}" for kind in ("conserved", "published") for what in ("points", "mean", "hausdorff")]
     digits = {"solves": 0} | {name: 0 if name.endswith("points") else 3 for name in measures}
-    header = ["shape", *(name.replace("_", " ") for name in digits), "note"]
+    columns = {"shape": "shape"} | {name.replace("_", " "): fixed(name, n) for name, n in digits.items()}
     tables = []
     for variant, here in grouped(rows, "variant").items():
         if known := good(here):
             here.append({"shape": "mean"} | {name: fmean(row[name] for row in known) for name in digits})
-        lines = cells_of(here, ["shape"], lambda row: [number(row[it], n) for it, n in digits.items()], len(digits))
-        tables.append((variant, header, lines))
+        tables.append(table(variant, here, columns))
     return tables
 
 
@@ -123,10 +122,8 @@ def turned(case: Case, count: int, pipeline: Pipeline) -> dict:
 
 def turn_tables(rows: list[dict]) -> Tables:
     """A table per variant."""
-    header = ["shape", "turns", "topology changes", "leaf changes", "median move", "largest move", "note"]
-
-    def cells(row):
-        counts = [str(row[key]) for key in ("runs", "topology_changes", "leaf_changes")]
-        return [*counts, *(number(of(row["moves"])) for of in (median, max))]
-
-    return [(name, header, cells_of(here, ["shape"], cells, 5)) for name, here in grouped(rows, "variant").items()]
+    columns = {"shape": "shape", "turns": "runs"}
+    columns |= {"topology changes": "topology_changes", "leaf changes": "leaf_changes"}
+    columns |= {"median move": lambda row: number(median(row["moves"]))}
+    columns |= {"largest move": lambda row: number(max(row["moves"]))}
+    return [table(name, here, columns) for name, here in grouped(rows, "variant").items()]

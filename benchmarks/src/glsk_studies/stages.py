@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 
@@ -15,22 +15,35 @@ from glsk_o3d import Pipeline
 from .clouds import cases
 from .runs import PUBLISHED, run
 from .stopwatch import MB, REST, SHARES, STAGES, Stopwatch, find, in_turns, peak, resident, yardstick
-from .tables import INK, Tables, good, keep, look, number, pick, plain_log, sheet, short
+from .tables import (
+    INK,
+    Table,
+    Tables,
+    by_size,
+    failures,
+    good,
+    grouped,
+    keep,
+    look,
+    middle,
+    number,
+    plain_log,
+    sheet,
+    short,
+)
 
 MIDDLE = (4096, 65536)  # sizes of the second growth exponent
 COUNTS = ("iterations", "contracted", "vertices")
 GROWTH = f"growth {MIDDLE[0]} to {MIDDLE[1]}"
 
 
-def timed(path: Path, pipelines: dict[str, Pipeline], repeat: int) -> dict:
-    """The yardstick and the pipelines in turns, on a saved cloud."""
+def timed(path: Path, pipeline: Pipeline, repeat: int) -> dict:
+    """The yardstick and a pipeline in turns, on a saved cloud."""
     points = np.load(path)
-    tasks = {"1 kNN": partial(yardstick, points)}
-    tasks |= {name: lambda pipeline=pipeline: counts_of(pipeline(points)) for name, pipeline in pipelines.items()}
+    tasks = {"1 kNN": partial(yardstick, points), "pipeline": lambda: counts_of(pipeline(points))}
     found = in_turns(tasks, repeat, STAGES)
-    _, knn = found.pop("1 kNN")
-    knn = {f"knn_{clock}": knn[clock] for clock in ("cpu", "wall")}
-    return {name: facts | result | knn for name, (result, facts) in found.items()}
+    counts, facts = found["pipeline"]
+    return facts | counts | {f"knn_{clock}": found["1 kNN"][1][clock] for clock in ("cpu", "wall")}
 
 
 def counts_of(skeleton) -> dict:
@@ -40,46 +53,36 @@ def counts_of(skeleton) -> dict:
     return counts | dict(vertices=len(skeleton.vertices), loops=skeleton.n_loops)
 
 
-def most_memory(path: Path, pipeline: Pipeline) -> dict:
-    """Peaks in MB beyond the imports, the cloud included; to be run in a fresh process."""
+def measure_stage(path: Path, pipeline: Pipeline, repeat: int) -> dict:
+    """Costs on a saved cloud, and peaks in MB beyond the imports, the cloud included; to be run in a fresh process."""
     before = resident()
     points = np.load(path)
     with Stopwatch(STAGES, memory=True) as watch:
         pipeline(points)
     peaks = {name: (share.peak - before) / MB for name, share in watch.shares.items() if share.peak}
-    return dict(peak=max(peaks.values(), default=(peak() - before) / MB), stage_peaks=peaks)
+    most = max(peaks.values(), default=(peak() - before) / MB)
+    return dict(peak=most, stage_peaks=peaks) | timed(path, pipeline, repeat)
 
 
 def measure_stages(
     sizes: list[int], pipelines: dict[str, Pipeline], shapes: str, kind: str, published_to: int, repeat: int, jobs: int
 ) -> list[dict]:
-    """Costs of every stage and of the whole: a row for each size, shape and pipeline."""
+    """Costs of every stage and of the whole: a row for each pipeline, size and shape, measured one after the other."""
     find(STAGES)  # now, not after an hour
-
-    def wanted(n):
-        return {name: it for name, it in pipelines.items() if name not in PUBLISHED or n <= published_to}
-
-    for n in sizes:
-        if left := ", ".join(name for name in pipelines if name not in wanted(n)):
-            typer.echo(f"left out: {left} on {n} points; see --published-to", err=True)
-    found = cases(None, True, ",".join(f"{kind}_{n}" for n in sizes), shapes)
+    work, left_out = [], []
     with tempfile.TemporaryDirectory() as folder:
-        alone, peaks = [], []
-        for case in found:
-            facts, path = dict(n=case.size, shape=case.shape, kind=kind), Path(folder, f"{case.shape}_{case.size}.npy")
+        for case in cases(None, True, ",".join(f"{kind}_{n}" for n in sizes), shapes):
+            path = Path(folder, f"{case.shape}_{case.size}.npy")
             np.save(path, case.load()[0])
-            chosen = wanted(case.size)
-            alone += [(facts, (path, chosen, repeat))] if chosen else []
-            peaks += [(facts | dict(pipeline=name), (path, it)) for name, it in chosen.items()]
-        # Timings alone, one after the other; how much memory is used does not depend on what else runs.
-        timings = run(timed, alone, min(jobs, 1), fresh=True)
-        peaks = run(most_memory, peaks, jobs, fresh=True)
-    rows = []
-    for row in peaks:
-        timing = pick(timings, n=row["n"], shape=row["shape"])[0]
-        failed = {name: text for name, text in timing.items() if name == "failure"}
-        rows.append(dict(measure="stages") | row | (failed or timing[row["pipeline"]]))
-    return rows
+            for name, pipeline in pipelines.items():
+                if name in PUBLISHED and case.size > published_to:
+                    left_out.append(f"{name} on {case.size} points")
+                    continue
+                facts = dict(measure="stages", n=case.size, shape=case.shape, kind=kind, pipeline=name)
+                work.append((facts, (path, pipeline, repeat)))
+        if left_out:
+            typer.echo(f"left out: {', '.join(dict.fromkeys(left_out))}; see --published-to", err=True)
+        return run(measure_stage, work, min(jobs, 1), fresh=True)
 
 
 def growth(sizes: Iterable[int], seconds: Iterable[float], low: float = 0, high: float = np.inf) -> float:
@@ -88,72 +91,65 @@ def growth(sizes: Iterable[int], seconds: Iterable[float], low: float = 0, high:
     return float(np.polyfit(*np.log(used).T, 1)[0]) if len(used) > 1 else float("nan")
 
 
-def over(rows: list[dict], value: Callable[[dict], float]) -> float:
-    """Median of a value over the rows, that is the shapes."""
-    return float(np.median([value(row) for row in rows]))
-
-
 def stage_tables(rows: list[dict]) -> Tables:
     """The whole of every pipeline, then a table of stages for each."""
+    tables = [whole_table(rows)]
+    for name, mine in grouped(good(rows), "pipeline").items():
+        tables.append((f"{name}: CPU ms (in kNN)", *stage_table(by_size(mine))))
+    return tables
+
+
+def whole_table(rows: list[dict]) -> Table:
+    """A line for each pipeline and size: medians over the shapes, and what failed."""
+    lines = []
+    for name, mine in grouped(rows, "pipeline").items():
+        for n, group in by_size(mine).items():
+            cells, here = ["-"] * 8, good(group)
+            if here:
+                knn, cpu, wall = (1000 * middle(here, key) for key in ("knn_cpu", "cpu", "wall"))
+                counts = [f"{middle(here, key):.0f}" for key in ("peak", *COUNTS)]
+                cells = [short(knn), short(cpu), number(cpu / knn, 1), short(wall), *counts]
+            lines.append([name, str(n), *cells, failures(group)])
     header = ["", "points", "1 kNN ms", "CPU ms", "in kNN", "wall ms", "MB", "solves", "contracted", "vertices", "note"]
-    names = list(dict.fromkeys(row["pipeline"] for row in rows))
-    lines, tables = [], []
-    for name in names:
-        mine = pick(rows, pipeline=name)
-        sizes = sorted({row["n"] for row in good(mine)})
-        at = {n: pick(good(mine), n=n) for n in sizes}
-        for n in sorted({row["n"] for row in mine}):
-            note = "; ".join(f"{row['shape']}: {row['failure']}" for row in pick(mine, n=n) if "failure" in row)
-            if n not in at:
-                lines.append([name, str(n), *"-" * 8, note])
-                continue
-            knn, cpu, wall = (1000 * over(at[n], lambda row, key=key: row[key]) for key in ("knn_cpu", "cpu", "wall"))
-            counts = [f"{over(at[n], lambda row, key=key: row[key]):.0f}" for key in ("peak", *COUNTS)]
-            cells = [short(knn), short(cpu), number(cpu / knn, 1), short(wall)]
-            lines.append([name, str(n), *cells, *counts, note])
-        if sizes:
-            tables.append((f"{name}: CPU ms (in kNN)", *stage_table(at)))
-    return [("end to end", header, lines), *tables]
+    return "end to end", header, lines
 
 
 def stage_table(at: dict[int, list[dict]]) -> tuple[list[str], list[list[str]]]:
     """Header and lines of one pipeline: costs of the stages over the sizes, how they grow, memory at the largest."""
-    largest = max(at)
-    costs: dict[str, Callable[[dict], float]] = {"1 kNN": lambda row: row["knn_cpu"]}
-    costs |= {name: lambda row, name=name: row["stages"][name]["cpu"] for name in (*STAGES, REST)}
-    costs["whole"] = lambda row: row["cpu"]
-    lines = []
-    for name, cost in costs.items():
-        seconds = [over(here, cost) for here in at.values()]
-        if name in STAGES and not any(seconds):
+    largest, lines = max(at), []
+    for name in ("1 kNN", *STAGES, REST, "whole"):
+        seconds = costs(at, name)
+        if not any(seconds) and name in STAGES:
             continue  # no such stage in this pipeline
-        cells = [
-            f"{short(1000 * spent)} ({number(spent / over(here, costs['1 kNN']), 2)})"
-            for spent, here in zip(seconds, at.values(), strict=True)
-        ]
+        pairs = zip(seconds, costs(at, "1 kNN"), strict=True)
+        cells = [f"{short(1000 * each)} ({number(each / knn, 2)})" for each, knn in pairs]
         slopes = [number(growth(at, seconds), 2), number(growth(at, seconds, *MIDDLE), 2)]
         peaks = [row["peak"] if name == "whole" else row["stage_peaks"].get(name, np.nan) for row in at[largest]]
         lines.append([name, *cells, *slopes, number(float(np.median(peaks)), 0)])
     return ["", *map(str, at), "growth", GROWTH, f"MB at {largest}"], lines
 
 
-def draw_growth(tables: Tables, folder: Path) -> None:
+def costs(at: dict[int, list[dict]], name: str) -> list[float]:
+    """CPU seconds of the yardstick, of a stage, or of the whole, for each size: the median over the shapes."""
+    if name in ("1 kNN", "whole"):
+        return [middle(here, "cpu" if name == "whole" else "knn_cpu") for here in at.values()]
+    return [middle(here, lambda row: row["stages"][name]["cpu"]) for here in at.values()]
+
+
+def draw_growth(rows: list[dict], folder: Path) -> None:
     """The whole of every pipeline over the size: CPU time, and in the yardstick, with the exponents that are fitted."""
-    (_, header, lines), parts = tables[0], {title.partition(":")[0]: rest for title, *rest in tables[1:]}
-    if not parts:
-        return
-    columns = [header.index(name) for name in ("points", "1 kNN ms", "CPU ms", "in kNN")]
     figure, (above, below) = sheet(6, rows=2, sharex=True)
-    yardstick: dict[float, float] = {}
-    for name, (head, stages) in parts.items():
-        known = [[line[i] for i in columns] for line in lines if line[0] == name and line[columns[2]] != "-"]
-        n, knn, cpu, ratio = np.array(known, float).T
-        yardstick |= zip(n, knn, strict=True)
-        knn_slope, slope = (stages[place][head.index(GROWTH)] for place in (0, -1))
-        above.plot(n, cpu, markersize=5, label=f"{name}, exponent {slope}", **look(name))
-        below.plot(n, ratio, markersize=5, **look(name))
+    yardstick: dict[int, float] = {}
+    for name, mine in grouped(good(rows), "pipeline").items():
+        at = by_size(mine)
+        knn, whole = np.array(costs(at, "1 kNN")), np.array(costs(at, "whole"))
+        yardstick |= zip(at, 1000 * knn, strict=True)
+        label = f"{name}, exponent {number(growth(at, whole, *MIDDLE), 2)}"
+        above.plot([*at], 1000 * whole, markersize=5, label=label, **look(name))
+        below.plot([*at], whole / knn, markersize=5, **look(name))
     style, sizes = dict(color=INK, linestyle=":", zorder=0), sorted(yardstick)
-    above.plot(sizes, [yardstick[n] for n in sizes], label=f"1 kNN, exponent {knn_slope}", **style)
+    milliseconds = [yardstick[n] for n in sizes]
+    above.plot(sizes, milliseconds, label=f"1 kNN, exponent {number(growth(sizes, milliseconds, *MIDDLE), 2)}", **style)
     below.axhline(1, **style)
     above.set(ylabel="CPU ms", xscale="log", yscale="log")
     above.yaxis.set_major_formatter("{x:g}")
@@ -165,32 +161,34 @@ def draw_growth(tables: Tables, folder: Path) -> None:
     keep(figure, folder, "speed_growth")
 
 
-def draw_shares(tables: Tables, folder: Path) -> None:
+def draw_shares(rows: list[dict], folder: Path) -> None:
     """What share of the time of `default` each part of it takes over the size, with the whole above."""
-    parts = [rest for title, *rest in tables if title.startswith("default:")]
-    if not parts:
-        return
-    header, lines = parts[0]
-    sizes = [int(name) for name in header if name.isdecimal()]
-    cost = {line[0]: np.array([cell.split()[0] for cell in line[1 : 1 + len(sizes)]], float) for line in lines}
-    spent = {
-        name: sum(cost.get(stage, np.zeros(len(sizes))) for stage in stages) for name, (stages, _) in SHARES.items()
-    }
+    at = by_size([row for row in good(rows) if row["pipeline"] == "default"])
+    places = range(len(at))
+    spent = {name: np.sum([costs(at, stage) for stage in stages], axis=0) for name, (stages, _) in SHARES.items()}
     figure, axes = sheet(4.2)
-    base, total = np.zeros(len(sizes)), sum(spent.values())
+    base, total = np.zeros(len(at)), sum(spent.values())
     for name, (_, color) in SHARES.items():
-        share, style = 100 * spent[name] / total, dict(color=color, edgecolor="white", linewidth=0.7)
-        axes.bar(range(len(sizes)), share, bottom=base, label=name, **style)
+        share = 100 * spent[name] / total
+        axes.bar(places, share, bottom=base, label=name, color=color, edgecolor="white", linewidth=0.7)
         base = base + share
-    for place, whole in enumerate(cost["whole"]):
-        axes.annotate(short(whole), (place, 100), (0, 3), textcoords="offset points", ha="center", fontsize=9)
+    for place, whole in zip(places, costs(at, "whole"), strict=True):
+        words, style = short(1000 * whole), dict(textcoords="offset points", ha="center", fontsize=9)
+        axes.annotate(words, (place, 100), (0, 3), **style)
     axes.set_title("CPU ms", fontsize=9, pad=18)
-    axes.set_xticks(range(len(sizes)), [thousands(n) for n in sizes])
+    axes.set_xticks(places, [thousands(n) for n in at])
     axes.set(xlabel="points", ylabel="share of the CPU time of default, %", ylim=(0, 100))
     axes.tick_params(axis="x", length=0)
     handles, labels = (each[::-1] for each in axes.get_legend_handles_labels())
     figure.legend(handles, labels, loc="outside right center", frameon=False, fontsize=9)
     keep(figure, folder, "speed_shares")
+
+
+def draw_stages(rows: list[dict], folder: Path) -> None:
+    """Both pictures; that of the shares where `default` is among the pipelines."""
+    draw_growth(rows, folder)
+    if any(row["pipeline"] == "default" for row in good(rows)):
+        draw_shares(rows, folder)
 
 
 def thousands(n: float) -> str:

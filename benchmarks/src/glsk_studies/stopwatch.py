@@ -9,13 +9,18 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from scipy.spatial import cKDTree
+
+if TYPE_CHECKING:  # what is measured is not to import more than it needs
+    import numpy as np
+
+    from glsk_o3d import Skeleton
 
 PACKAGE = "glsk_o3d"
 REST = "rest"  # what belongs to no stage
@@ -83,7 +88,6 @@ class Share:
 
     calls: int = 0
     cpu: float = 0.0  # seconds, all threads, without the stages inside
-    wall: float = 0.0  # seconds
     peak: int = 0  # bytes resident at most, all of the process; 0 if it was not measured
 
 
@@ -129,11 +133,12 @@ class Stopwatch:
         originals = {id(vars(owner)[name]): (stage, vars(owner)[name]) for stage, owner, name in self._found}
         self._wrapped = {key: self._timed(*each) for key, each in originals.items()}
         self._replace(self._wrapped)
-        self._running, self._since = [REST], _clocks()
+        self._running, self._since, self.wall = [REST], _cpu(), -time.perf_counter()
         return self
 
     def __exit__(self, *error):
         self._charge()
+        self.wall += time.perf_counter()
         self._running = []
         self._replace({id(wrapper): wrapper.__wrapped__ for wrapper in self._wrapped.values()})
 
@@ -141,11 +146,6 @@ class Stopwatch:
     def cpu(self) -> float:
         """CPU seconds of all stages and the rest."""
         return sum(share.cpu for share in self.shares.values())
-
-    @property
-    def wall(self) -> float:
-        """Seconds of all stages and the rest."""
-        return sum(share.wall for share in self.shares.values())
 
     def _replace(self, others):
         """Put others in the place of functions wherever they may be known by a name, also in modules imported since."""
@@ -178,18 +178,17 @@ class Stopwatch:
 
     def _charge(self):
         """Charge the running stage with what was spent since the last change."""
-        share, now = self.shares[self._running[-1]], _clocks()
-        share.cpu += now[0] - self._since[0]
-        share.wall += now[1] - self._since[1]
+        share, now = self.shares[self._running[-1]], _cpu()
+        share.cpu += now - self._since
         if self._memory:
             share.peak = max(share.peak, peak())
             reset_peak()
-            now = _clocks()
+            now = _cpu()
         self._since = now
 
 
-def _clocks():
-    return time.process_time(), time.perf_counter()
+def _cpu() -> float:
+    return time.process_time()
 
 
 def peak() -> int:
@@ -217,30 +216,37 @@ def _status(key: str) -> int:
     return next((int(line.split()[1]) * 1024 for line in lines if line.startswith(key)), 0)
 
 
+def once(pipeline: Callable[[np.ndarray], Skeleton], points: np.ndarray) -> tuple[Skeleton, dict[str, float]]:
+    """A skeleton, its CPU and wall seconds, and the most memory beyond what was resident before, in MB."""
+    reset_peak()
+    before = resident()
+    with Stopwatch({}) as watch:
+        skeleton = pipeline(points)
+    return skeleton, dict(cpu=watch.cpu, wall=watch.wall, peak=(peak() - before) / MB)
+
+
 def in_turns(tasks: dict, repeat: int, stages: Mapping[str, Stage] | None = None) -> dict[Any, tuple[Any, dict]]:
     """Run tasks one after the other, again and again, so that what disturbs the machine disturbs them all.
 
     That is `repeat` times at least, and for `LEAST` CPU seconds. Gives for each task its last result, and medians
-    over the runs: ``cpu`` and ``wall`` seconds, and the same for every stage in ``stages``.
+    over the runs: ``cpu`` and ``wall`` seconds, and the CPU seconds of every stage in ``stages``.
     """
     watches, results = {name: [] for name in tasks}, {}
-    end = time.process_time() + LEAST
-    turns = 0
+    end, turns = time.process_time() + LEAST, 0
     while turns < repeat or (turns < MOST and time.process_time() < end):
         for name, task in tasks.items():
             with Stopwatch(stages or {}) as watch:
                 results[name] = task()
             watches[name].append(watch)
         turns += 1
-    found = {}
-    for name, taken in watches.items():
-        parts = {stage: _medians([watch.shares[stage] for watch in taken]) for stage in taken[0].shares}
-        found[name] = results[name], dict(_medians(taken), runs=turns, stages=parts)
-    return found
+    return {name: (results[name], medians(taken)) for name, taken in watches.items()}
 
 
-def _medians(taken):
-    return {clock: median(getattr(it, clock) for it in taken) for clock in ("cpu", "wall")}
+def medians(taken: list[Stopwatch]) -> dict[str, Any]:
+    """Of several runs: the seconds of the whole and of every stage, and how many runs there were."""
+    whole = {clock: median(getattr(watch, clock) for watch in taken) for clock in ("cpu", "wall")}
+    parts = {stage: dict(cpu=median(watch.shares[stage].cpu for watch in taken)) for stage in taken[0].shares}
+    return dict(whole, runs=len(taken), stages=parts)
 
 
 def yardstick(points) -> None:

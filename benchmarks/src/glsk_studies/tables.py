@@ -10,15 +10,15 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 from statistics import fmean
 from typing import Any
 
 import numpy as np
 import typer
-from rich import table as rich_table
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
+from rich.markdown import Markdown
 
 from glsk_o3d.data.report import Report
 from glsk_o3d.interop.atomic import write_atomically
@@ -27,9 +27,10 @@ from glsk_o3d.viewing.figures import INK, save_figure
 ROOT = Path(__file__).resolve().parents[3]
 Table = tuple[str, list[str], list[list[str]]]  # title, header, lines
 Tables = list[Table]
+Columns = Mapping[str, str | Callable[[dict], Any]]  # by header: a fact of a row, or what makes a cell of it
 # columns that are not numbers, besides the first
-TEXT = {"pipeline", "setting", "takes", "worst", "wrong", "note", "now right", "now wrong"}
-TEXT |= {"measure", "to", "why", "which", "failed", "most in", "packages", "commit"}
+TEXT = {"pipeline", "setting", "takes", "note", "now right", "now wrong", "measure", "to", "why", "which", "failed"}
+TEXT |= {"most in", "packages", "commit"}
 GREY, ORANGE, BLUE = "#777777", "#d95f02", "#1f4e9c"  # distinct without red and green, and in print
 LOOKS = {"default": dict(color=BLUE, marker="o"), "wen2024": dict(color=ORANGE, marker="^")}
 LOOKS |= {"cao2010": dict(color=GREY, marker="s")}
@@ -41,14 +42,29 @@ def pick(rows: list[dict], **facts) -> list[dict]:
     return [row for row in rows if all(row[name] == value for name, value in facts.items())]
 
 
-def grouped(rows: list[dict], fact: str) -> dict[str, list[dict]]:
+def grouped(rows: list[dict], fact: str) -> dict[Any, list[dict]]:
     """The rows by a fact, in their order."""
     return {name: pick(rows, **{fact: name}) for name in dict.fromkeys(row[fact] for row in rows)}
+
+
+def by_size(rows: list[dict]) -> dict[int, list[dict]]:
+    """The rows by their number of points, small ones first."""
+    return dict(sorted(grouped(rows, "n").items()))
 
 
 def good(rows: list[dict]) -> list[dict]:
     """The rows that are no failures."""
     return [row for row in rows if "failure" not in row]
+
+
+def failures(rows: list[dict]) -> str:
+    """Which shapes failed, and how."""
+    return "; ".join(f"{row['shape']}: {row['failure']}" for row in rows if "failure" in row)
+
+
+def middle(rows: list[dict], fact: str | Callable[[dict], float]) -> float:
+    """Median of a fact, or of a value, over the rows."""
+    return float(np.median([row[fact] if isinstance(fact, str) else fact(row) for row in rows]))
 
 
 def summary(rows: list[dict]) -> dict:
@@ -78,8 +94,9 @@ def write_packed(path: Path, content: dict[str, Any]) -> None:
     write_atomically(path, lambda temporary: Path(temporary).write_bytes(packed))
 
 
+@cache
 def surroundings() -> dict[str, Any]:
-    """The commit, the machine and the versions that results are of."""
+    """The commit, the machine and the versions that results are of, as they are when this is first asked."""
     commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True)
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
     facts = Path("/proc/cpuinfo").read_text() if Path("/proc/cpuinfo").is_file() else ""
@@ -117,70 +134,65 @@ def short(value: float) -> str:
     return f"{value:.{0 if value >= 100 else 1 if value >= 10 else 2}f}"
 
 
-def cells_of(rows: list[dict], names: list[str], cells: Callable[[dict], list[str]], count: int) -> list[list[str]]:
-    """A line for each row: its `names`, so many cells, and a note; of a failure dashes, and its reason."""
-    lines = []
-    for row in rows:
-        found = ["-"] * count if "failure" in row else cells(row)
-        lines.append([*(str(row[name]) for name in names), *found, row.get("failure", "")])
-    return lines
+def quartiles(values: np.ndarray, digits: int = 2) -> str:
+    """Median and quartiles in words."""
+    if len(values) == 0:
+        return "-"
+    low, median, high = (f"{value:.{digits}f}" for value in np.quantile(values, [0.25, 0.5, 0.75]))
+    return f"{median} ({low} to {high})"
 
 
-def present(tables: Tables, markdown: bool, where: str = "") -> None:
-    """Print tables, and before them where they were measured; `TEXT` and first columns lean left, numbers right."""
-    if where:
-        typer.echo(f"{where}\n")
-    console = Console(width=None if sys.stdout.isatty() else 180, markup=False, highlight=False, emoji=False)
-    for title, header, rows in tables:
-        if markdown:
-            typer.echo(markdown_table(title, header, rows))
-            continue
-        table = rich_table.Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False, header_style="")
-        for place, name in enumerate(header):
-            table.add_column(name, justify="right" if _is_number(place, name) else "left", no_wrap=name not in TEXT)
-        for cells in rows:
-            table.add_row(*cells)
-        with console.capture() as captured:
-            console.print(table)
-        typer.echo("\n".join(line.rstrip() for line in captured.get().splitlines()))
+def fixed(fact: str, digits: int = 2) -> Callable[[dict], str]:
+    """A column of a fact with so many decimals."""
+    return lambda row: number(row[fact], digits)
 
 
-def markdown_table(title: str, header: list[str], rows: list[list[str]]) -> str:
-    """A table in Markdown."""
-    line = ["--:" if _is_number(place, name) else "---" for place, name in enumerate(header)]
-    lines = ["| " + " | ".join(cells) + " |" for cells in (header, line, *rows)]
-    return "\n".join([f"**{title}**", "", *lines, ""])
+def brief(fact: str, factor: float = 1) -> Callable[[dict], str]:
+    """A column of a fact times a factor, with three digits."""
+    return lambda row: short(factor * row[fact])
 
 
-def _is_number(place, name):
-    return place > 0 and name not in TEXT
+def table(title: str, rows: list[dict], columns: Columns, note: bool = True) -> Table:
+    """A line for each row, by default with the reason of its failure; a dash for what is not known of a row."""
+    columns = {**columns, "note": lambda row: row.get("failure", "")} if note else columns
+
+    def cell(row, column):
+        try:
+            return str(row[column] if isinstance(column, str) else column(row))
+        except KeyError:  # a failure has few facts
+            return "-"
+
+    return title, [*columns], [[cell(row, column) for column in columns.values()] for row in rows]
 
 
-def fill(page: Path, parts: Mapping[str, Tables | str], check: bool = False) -> None:
-    """Put tables, or texts, into a page between the lines ``<!-- NAME -->`` and ``<!-- end -->``; or only look."""
+def present(tables: Tables) -> None:
+    """Print tables: drawn on a terminal, as Markdown into a file or a pipe."""
+    text = markdown(tables)
+    if sys.stdout.isatty():
+        Console().print(Markdown(text))
+    else:
+        typer.echo(text)
+
+
+def markdown(tables: Tables) -> str:
+    """Tables in Markdown; `TEXT` and first columns lean left, numbers right."""
+    parts = []
+    for title, header, lines in tables:
+        rule = ["--:" if place and name not in TEXT else "---" for place, name in enumerate(header)]
+        parts += [f"**{title}**", "", *("| " + " | ".join(cells) + " |" for cells in (header, rule, *lines)), ""]
+    return "\n".join(parts)
+
+
+def fill(page: Path, parts: Mapping[str, Tables | str]) -> None:
+    """Put tables, or texts, into a page between the lines ``<!-- NAME -->`` and ``<!-- end -->``."""
     text = page.read_text(encoding="utf-8")
     for name, body in parts.items():
-        if not isinstance(body, str):
-            body = "\n".join(markdown_table(*table) for table in body)
+        body = body if isinstance(body, str) else markdown(body)
         pattern = rf"(<!-- {name} -->\n).*?(<!-- end -->)"
         text, found = re.subn(pattern, lambda match, body=body: f"{match[1]}\n{body}\n{match[2]}", text, flags=re.S)
         if found != 1:
             raise typer.BadParameter(f"{page} has no lines <!-- {name} --> and <!-- end -->")
-    if not check:
-        write_atomically(page, lambda temporary: Path(temporary).write_text(text, encoding="utf-8"))
-
-
-def page_with(*parts: str) -> Callable[[Path | None], Path | None]:
-    """A check that a page is there and has the lines between which `fill` puts these parts."""
-
-    def checked(path: Path | None) -> Path | None:
-        if path is not None:
-            if not path.is_file():
-                raise typer.BadParameter(f"there is no page {path}")
-            fill(path, dict.fromkeys(parts, ""), check=True)
-        return path
-
-    return checked
+    write_atomically(page, lambda temporary: Path(temporary).write_text(text, encoding="utf-8"))
 
 
 def look(name: str) -> dict:

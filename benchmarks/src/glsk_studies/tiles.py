@@ -23,10 +23,11 @@ from scipy.spatial.transform import Rotation
 from glsk_o3d import Skeleton, read_skeleton, samples
 from glsk_o3d.analysis.curves import along, pieces
 from glsk_o3d.apps.batch.tiles import Grid
+from glsk_o3d.io.formats import ply
 
-from .batch import glsk_batch, kill_one, ledger, write_ply
-from .runs import Markdown, Output, writable
-from .tables import BLUE, INK, number, present, save, save_figure, sheet
+from .batch import facts_table, glsk_batch, kill_one, ledger
+from .runs import Output, application, writable
+from .tables import BLUE, INK, present, save, save_figure, sheet
 
 COLUMNS, ROWS, ROOM = 10, 5, 1.8  # objects along x and y, and their distance
 ON_SEAMS = ((3, 6), (1, 3))  # columns that stand exactly on a seam, and rows: four objects stand on corners of tiles
@@ -43,7 +44,7 @@ SHAPES = (
     samples.two_rings,
     partial(samples.tree, length=0.5, radius=0.05, forks=2),
 )
-app = typer.Typer(add_completion=False)
+app = application(None)
 
 
 class Scene(NamedTuple):
@@ -154,35 +155,25 @@ def main(
     picture: Annotated[
         Path | None, typer.Option("--picture", metavar="PNG", help="Draw the skeleton from above.", callback=writable)
     ] = None,
-    markdown: Markdown = False,
     output: Output = None,
 ) -> None:
     """Skeletonise a large scene in tiles, and kill a worker in the midst of it."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         scene, path = make_scene(points), folder / "scene.ply"
-        write_ply(path, scene.points)
+        ply.save(path, {"positions": scene.points})
         undisturbed = glsk_batch(path, folder / "whole", "--tiles", str(SIZE), "--workers", "2")
         most = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 2**20
         rows = {row["name"]: row for row in ledger(folder / "whole")}
         killed = kill_one(path, folder / "killed", max(2, len(rows) // 3), "--tiles", str(SIZE))
         results = [folder / run / "scene.ply" for run in ("whole", "killed")]
-        found = read_skeleton(results[1])
         killed["bits as in the undisturbed run"] = results[0].read_bytes() == results[1].read_bytes()
-        joined = rows["scene"]
-        facts = {
-            "points": points,
-            "tiles": len(rows) - 1,
-            "wall": undisturbed["wall"],
-            "most memory of a process": most,
-        }
-        facts |= {"most memory of a process": most}
-        facts |= {"seams": joined["seams"], "unmatched": joined["unmatched"], **checked(found, scene)}
-        facts["seconds of a tile, most"] = max(row["seconds"] for each, row in rows.items() if each != "scene")
-        if picture is not None:
-            draw(found, scene, picture)
+        found, joined = read_skeleton(results[1]), rows.pop("scene")
+    facts = {"points": points, "tiles": len(rows), "wall": undisturbed["wall"], "most memory of a process": most}
+    facts |= {"seams": joined["seams"], "unmatched": joined["unmatched"], **checked(found, scene)}
+    facts["seconds of a tile, most"] = max(row["seconds"] for row in rows.values())
+    if picture is not None:
+        draw(found, scene, picture)
     title = f"One scene of {points} points, 50 objects, tiles of {SIZE:g}, two workers, {os.cpu_count()} cores"
-    for heading, those in ((title, facts), ("Again, one of two workers killed", killed)):
-        cells = [[key, number(value, 4) if isinstance(value, float) else str(value)] for key, value in those.items()]
-        present([(heading, ["", "note"], cells)], markdown)
+    present([facts_table(title, facts), facts_table("Again, one of two workers killed", killed)])
     save(output, [{"run": "undisturbed", **facts}, {"run": "one of two workers killed", **killed}])

@@ -8,7 +8,7 @@ from __future__ import annotations
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 import typer
@@ -17,60 +17,59 @@ from glsk_o3d import samples
 
 from . import forest
 from .peers import installed, one_thread
-from .runs import Folder, Jobs, application, numbers, run, study
+from .runs import Folder, Jobs, Output, Page, application, numbers, publish, run
 
 app = application(__doc__)
 Trees = Annotated[int, typer.Option("--trees", min=1, help="How many built-in trees.")]
 
 
-@study(
-    app,
-    forest.curve_tables,
-    lambda options: "trees of a folder" if options["folder"] else "trees",
-    where=True,
-    shown=1,
-)
+@app.command()
 def curves(
     folder: Folder = None,
-    up: Annotated[str, typer.Option("--up", help="Axis of a folder's trees that points up: x, y or z.")] = "z",
+    up: Annotated[Literal["x", "y", "z"], typer.Option("--up", help="Axis of a folder's trees that points up.")] = "z",
     trees: Trees = 5,
     tool: Annotated[str, typer.Option("--tool", metavar="NAMES", help="With commas; else all installed.")] = "",
     limit: Annotated[float, typer.Option("--limit", help="Seconds for a skeleton, imports included.")] = 120.0,
     jobs: Jobs = 2,
-) -> list[dict]:
+    output: Output = None,
+    page: Page = None,
+) -> None:
     """Skeletons of sparse trees against their axes: built-in trees, or those of a folder."""
     tools = installed(forest.TOOLS, tool)
     found = forest.sparse_trees(folder, up, trees)
     if not found:
         raise typer.BadParameter(f"there is no NAME.npz in {folder}")
     one_thread()
-    work = [(dict(tool=name, **it.facts), (it, peer)) for (name, peer), it in product(tools.items(), found)]
-    return run(forest.measure_curve, work, jobs, fresh=True, limit=limit)
+    pairs = product(tools.items(), found)
+    work = [(dict(tool=name, condition=it[1], tree=it[0]), (it, peer)) for (name, peer), it in pairs]
+    rows = run(forest.measure_curve, work, jobs, fresh=True, limit=limit)
+    publish(rows, forest.curve_tables, output, page, "trees of a folder" if folder else "trees")
 
 
-@study(app, forest.measure_tables, "measures", where=True)
-def measures(trees: Trees = 20, jobs: Jobs = 2) -> list[dict]:
+@app.command()
+def measures(trees: Trees = 20, jobs: Jobs = 2, output: Output = None, page: Page = None) -> None:
     """Volume, diameter and height of trees with a surface, whole and scanned by a lidar."""
     work = [(dict(condition=it, tree=seed), (seed, it)) for it in ("clean", "lidar") for seed in range(trees)]
-    return run(forest.measure_tree, work, jobs)
+    publish(run(forest.measure_tree, work, jobs), forest.measure_tables, output, page, "measures")
 
 
-@study(app, forest.stem_tables, "stems", where=True, shown=1)
-def stems(trees: Trees = 36, jobs: Jobs = 2) -> list[dict]:
+@app.command()
+def stems(trees: Trees = 36, jobs: Jobs = 2, output: Output = None, page: Page = None) -> None:
     """Stem diameters and volumes of trees that one to three scanners see.
 
     On the seeds from 0 the numbers were chosen, those from 100 show what they are worth.
     """
     sets = {"chosen": range(trees), "other": range(100, 100 + trees)}
     work = [(dict(seeds=name, tree=seed), (seed,)) for name, seeds in sets.items() for seed in seeds]
-    return run(forest.measure_stem, work, jobs)
+    publish(run(forest.measure_stem, work, jobs), forest.stem_tables, output, page, "stems")
 
 
-@study(app, forest.model_tables, where=True)
+@app.command()
 def models(
     paths: Annotated[list[Path], typer.Argument(metavar="CLOUD MODEL...", exists=True, dir_okay=False)],
     unit: Annotated[float, typer.Option("--unit", help="Of the clouds, in metres, as models are.")] = 1,
-) -> list[dict]:
+    output: Output = None,
+) -> None:
     """Scanned trees beside the cylinder models that TreeQSM, SimpleForest or aRchi made of them: pairs of files.
 
     A model is a .mat of TreeQSM or a table of any of the three; z points up.
@@ -78,14 +77,16 @@ def models(
     if len(paths) % 2:
         raise typer.BadParameter("give pairs: each cloud, and then its model")
     work = [(dict(tree=cloud.stem), (cloud, model, unit)) for cloud, model in zip(paths[::2], paths[1::2], strict=True)]
-    return run(forest.measure_model, work, 1)
+    publish(run(forest.measure_model, work, 1), forest.model_tables, output)
 
 
-@study(app, forest.large_tables, "large", where=True)
+@app.command()
 def large(
     sizes: Annotated[str, typer.Option("--sizes", metavar="N,N", help="Points.")] = "100000,1000000",
     forks: Annotated[int, typer.Option("--forks", min=1, max=8, help="Of the tree, from foot to tip.")] = 4,
-) -> list[dict]:
+    output: Output = None,
+    page: Page = None,
+) -> None:
     """Time and memory of lidar scans of one tree, with and without tracing."""
     rows = []
     for n in numbers(sizes):
@@ -93,5 +94,5 @@ def large(
             path = Path(folder, "scan.npy")
             np.save(path, samples.tree(n, forks=forks, seed=1, noise=forest.NOISE, cameras=forest.CAMERAS).points)
             work = [(dict(n=n, pipeline=name), (path, name)) for name in forest.PIPELINES]
-            rows += run(forest.once, work, 1, fresh=True)
-    return rows
+            rows += run(forest.measure_scan, work, 1, fresh=True)
+    publish(rows, forest.large_tables, output, page, "large")
