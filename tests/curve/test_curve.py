@@ -49,7 +49,7 @@ def others(thing):
 
 
 @pytest.mark.parametrize("what", ["curve", "skeleton", "surface"])
-def test_what_is_kept_of_a_changed_curve_is_what_would_be_computed(raw, what):
+def test_a_changed_curve_keeps_only_what_would_be_computed_again(raw, what):
     raw = replace(raw, vertex_of_point=np.where(raw.vertex_of_point < 9, -1, raw.vertex_of_point))  # some own none
     given = {"curve": Curve.of, "skeleton": lambda it: it, "surface": lambda it: oriented(Curve.of(it))}[what](raw)
     derived, kept = derived_of(type(given)), set()

@@ -39,7 +39,7 @@ def curve_of(skeleton):
 
 
 @pytest.mark.parametrize("sides", [(1,), (1, -1)])
-def test_handles_keep_to_their_axes_up_to_the_wall_and_go_on_to_the_middle_of_the_body(sides):
+def test_handles_keep_to_their_axes_up_to_the_wall_and_end_in_the_middle_of_the_body(sides):
     """The body, as thick as it is long, has no ends then; its points belong to the middle, with its radius."""
     body = np.array([[0, 0, -0.35], [0, 0, 0.35]])
     skeleton = skeletonize(joined((body, BODY), *((bow(side), HANDLE) for side in sides)), limb=0.95)

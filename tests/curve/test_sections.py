@@ -18,7 +18,7 @@ def half_axes(sections):
 
 
 @pytest.mark.parametrize("side", [None, [0, 1, 0]])
-def test_a_tube_and_half_of_one(piped, side):
+def test_a_tube_and_half_of_one_have_its_radius(piped, side):
     found = measure_sections(piped([[(0, 0, 0), (1, 0, 0)]], radius=0.1, spacing=0.005, side=side))
     np.testing.assert_allclose(half_axes(found), 0.1, rtol=1e-9)
     np.testing.assert_allclose(found.radius, 0.1, rtol=1e-9)
@@ -35,7 +35,7 @@ def test_a_bar_has_its_half_axes_however_it_is_turned(flat_bar, seen):
     np.testing.assert_allclose(found.radius, np.sqrt(0.08) * size, rtol=1e-6)
 
 
-def test_what_nobody_saw_is_the_radius(flat_bar):
+def test_an_unseen_half_axis_is_the_radius(flat_bar):
     bar = flat_bar(0.4, 0.2)
     top = (np.abs(bar.normals[:, [1]]) == 1) & (bar.points[:, [1]] > 0)
     face = measure_sections(replace(bar, normals=np.where(top, bar.normals, np.nan)))

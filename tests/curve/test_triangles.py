@@ -9,7 +9,7 @@ from glsk_o3d import Skeleton
 
 
 def slow(skeleton, by_degree):
-    """All prices anew before every merge: members, positions and edges of what is left."""
+    """All prices anew before every merge: members, positions and edges of what remains."""
     position = dict(enumerate(skeleton.vertices))
     support = np.bincount(skeleton.vertex_of_point[skeleton.supporting_points], minlength=len(position))
     weight = dict(enumerate(np.maximum(support, 1.0)))
@@ -40,7 +40,7 @@ def slow(skeleton, by_degree):
 @pytest.mark.slow
 @settings(max_examples=100)
 @given(st.integers(0, 10**6), st.integers(3, 25), st.floats(0.3, 1.2), st.booleans(), st.booleans())
-def test_always_the_cheapest_edge(random_skeleton, refine, seed, m, reach, every, by_degree):
+def test_triangles_collapse_at_the_cheapest_edge(random_skeleton, refine, seed, m, reach, every, by_degree):
     raw = random_skeleton(seed, m, reach, every=every)
     skeleton = refine(raw, collapse="degree" if by_degree else "length")
     members, position, links = slow(raw, by_degree)
@@ -59,7 +59,7 @@ def test_always_the_cheapest_edge(random_skeleton, refine, seed, m, reach, every
 
 
 @pytest.mark.parametrize(("collapse", "merged"), [("length", [0, 0.05, 0]), ("degree", [2.5, 0, 0])])
-def test_a_triangle_with_a_tail(refine, collapse, merged):
+def test_a_triangle_with_a_tail_collapses_by_length_or_degree(refine, collapse, merged):
     """Its long edge is between two free corners, its short one at the corner with the tail."""
     corners = np.array([[0, 0, 0], [5, 0, 0], [0, 0.1, 0], [0, 1, 0]])
     edges, owner = [(0, 1), (0, 2), (1, 2), (2, 3)], np.repeat(np.arange(4), 9)

@@ -57,7 +57,7 @@ def test_the_curve_goes_straight_through_a_disc(wander, backward):
     np.testing.assert_array_equal(found.vertex_of_point[of_handle], given.vertex_of_point[of_handle])
 
 
-def test_other_ends_stay_as_they_are():
+def test_bars_and_long_limbs_are_no_wide_ends():
     """A bar has no neck, and what is far longer than wide behind one is a limb of its own."""
     x = np.linspace(-0.68, 0.2, 40)
     given, found = led(np.column_stack([x, 0 * x, 0 * x]), *paddle(disc=0.06, handle=0.05))
@@ -67,7 +67,7 @@ def test_other_ends_stay_as_they_are():
     assert found is given
 
 
-def test_both_ends_may_be_wide():
+def test_both_ends_of_a_dumbbell_are_wide():
     """A dumbbell of two discs, the second as far behind the handle's end as the first before it."""
     points, normals = paddle()
     own = points[:, 0] > -0.5
