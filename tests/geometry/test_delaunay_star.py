@@ -67,7 +67,7 @@ WHOLE = st.integers(-4, 4)
 @pytest.mark.slow
 @settings(max_examples=800)
 @given(st.lists(st.tuples(WHOLE, WHOLE, st.booleans() | st.just(True)), min_size=1, max_size=14))
-def test_against_exact_arithmetic(rows):
+def test_a_star_is_that_of_exact_arithmetic(rows):
     offsets, valid = [row[:2] for row in rows], [row[2] for row in rows]
     expected, closed = exact_star(offsets, valid)
     ring, is_closed = star(offsets, valid)
@@ -82,7 +82,7 @@ def test_against_exact_arithmetic(rows):
         assert found == expected or (straight and found == expected[::-1])
 
 
-def test_grids_that_are_hardly_disturbed():
+def test_a_star_in_a_hardly_disturbed_grid_is_that_of_exact_arithmetic():
     """Squares with corners off by 1e-8 of their side: four neighbours are nearly, but not, on one circle."""
     rng, side = np.random.default_rng(0), np.arange(-2, 3) * 10**12
     grid = np.stack(np.meshgrid(side, side), -1).reshape(-1, 2)

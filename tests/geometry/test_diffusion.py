@@ -26,12 +26,12 @@ def test_a_wave_on_a_plane_shrinks_by_its_eigenvalue(length, wave):
     np.testing.assert_allclose(found, wanted, atol=0.08)
 
 
-def test_scale_and_offset_do_not_matter():
+def test_diffusion_does_not_depend_on_scale_and_offset():
     values = RNG.normal(size=(len(GRID), 3))
     here = diffused(GRID, values, 2)
     np.testing.assert_allclose(diffused(1e3 * GRID + 1e6, values + 1e6, 2e3) - 1e6, here, atol=1e-6)
 
 
 @pytest.mark.parametrize("points", [np.zeros((1, 3)), np.zeros((20, 3)), np.repeat(GRID[:4], 9, axis=0)])
-def test_points_in_one_place_give_numbers(points):
+def test_points_in_one_place_diffuse_to_finite_numbers(points):
     assert np.isfinite(diffused(points, RNG.normal(size=(len(points), 2)), 1)).all()

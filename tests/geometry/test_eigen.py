@@ -21,7 +21,7 @@ def entries(made):
 
 @pytest.mark.parametrize("scale", [1e-12, 1, 1e12])
 @pytest.mark.parametrize("spread", SPREADS)
-def test_against_known_ones(spread, scale):
+def test_eigenvalues_and_directions_are_the_known_ones(spread, scale):
     made, turns = matrices(scale * np.array(spread, float))
     made = entries(made)
     values, least = principal_parts(made)
@@ -41,7 +41,7 @@ def test_against_known_ones(spread, scale):
 
 
 @pytest.mark.parametrize("gap", [1e-2, 1e-4, 1e-6, 1e-8, 1e-10])
-def test_directions_of_eigenvalues_that_hardly_stand_out(gap):
+def test_directions_of_eigenvalues_that_hardly_stand_out_are_exact(gap):
     """As good as the matrix itself lets them be, on either side of where NumPy takes over."""
     made, turns = matrices(np.array([0, gap, 1]))
     along = np.abs(np.einsum("ni,ni->n", principal_parts(entries(made))[1], turns[:, :, 0]))

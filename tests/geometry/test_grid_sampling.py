@@ -38,7 +38,7 @@ def test_the_sample_of_blocks_is_that_of_the_whole(points, rows):
 
 
 @pytest.mark.parametrize(("n", "rows"), [(5001, 1000), (5001, 5000), (300, 1)])
-def test_blocks_that_have_nothing_nearer_change_nothing(n, rows):
+def test_a_small_last_block_changes_nothing(n, rows):
     """Such as a last block of one point."""
     for seed in range(5):
         points = np.random.default_rng(seed).random((n, 3))
@@ -47,7 +47,7 @@ def test_blocks_that_have_nothing_nearer_change_nothing(n, rows):
 
 
 @pytest.mark.parametrize(("chunk", "threads"), [(37, 1), (1000, 3)])
-def test_threads_and_how_many_points_at_a_time_change_nothing(chunk, threads, monkeypatch):
+def test_a_sample_does_not_depend_on_threads_and_chunks(chunk, threads, monkeypatch):
     rng = np.random.default_rng(0)
     # one cell has more points than a chunk, and many of them are copies
     points = np.concatenate([rng.random((4000, 3)), 0.5 + 1e-4 * rng.random((3000, 3)), np.full((2000, 3), 0.25)])

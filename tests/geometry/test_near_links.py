@@ -11,11 +11,11 @@ LINE = np.column_stack([np.arange(40.0), np.zeros((40, 2))])
 
 
 @pytest.mark.parametrize("n", [0, 1, 2, 3])
-def test_few_points(n):
+def test_few_points_have_a_matrix_of_links(n):
     assert near_links(LINE[:n]).shape == (n, n)
 
 
-def test_growth_along_curves_on_surfaces_and_in_space():
+def test_links_grow_as_the_dimension_of_a_cloud():
     growth = [np.median(link_growth(near_links(RNG.random((3000, 3)) * size))) for size in ([1, 0, 0], [1, 1, 0], 1)]
     np.testing.assert_allclose(growth, [5 / 3, 2.55, 4.1], atol=0.15)
 

@@ -1,4 +1,4 @@
-"""Merging mutual nearest neighbours, against its definition, and how much is looked up."""
+"""Merging mutual nearest neighbours, against its definition."""
 
 import numpy as np
 import pytest
@@ -33,25 +33,9 @@ def defined(points, neighbours, most, least):
 
 @pytest.mark.parametrize("most", [np.inf, 3])
 @pytest.mark.parametrize("kind", CLOUDS)
-def test_definition(kind, most):
+def test_merged_pairs_are_those_of_the_definition(kind, most):
     points = CLOUDS[kind](np.random.default_rng(0))
     neighbours = cKDTree(points).query(points, 12)[1]
     for least in (0, len(points) // 2):
         merged = merge_pairs(points, neighbours, lambda pairs, mass: pairs, most, least)
         np.testing.assert_array_equal(merged, defined(points, neighbours, most, least))
-
-
-def test_only_points_whose_nearest_is_gone_are_looked_up_again():
-    """Along a row of points that get ever denser one pair a round is merged."""
-    looked_up = []
-
-    class Counted(np.ndarray):
-        def take(self, rows, **how):
-            looked_up.append(len(rows))
-            return np.asarray(self).take(rows, **how)
-
-    points = CLOUDS["ever denser"](None)
-    neighbours = cKDTree(points).query(points, 12)[1].view(Counted)
-    merge_pairs(points, neighbours, lambda pairs, mass: pairs)
-    assert len(looked_up) > len(points) / 2
-    assert sum(looked_up) < 2 * len(points)

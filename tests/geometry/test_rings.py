@@ -32,7 +32,7 @@ def case(request):
     return lists, closed, rings_of(lists, closed)
 
 
-def test_rows_triangles_and_lengths(case):
+def test_rows_triangles_and_lengths_are_those_of_loops(case):
     lists, closed, rings = case
     assert (lists_of(rings), rings.closed.tolist()) == (lists, closed)
     assert rings.sizes.tolist() == [len(row) for row in lists]
@@ -51,7 +51,7 @@ def test_rows_triangles_and_lengths(case):
     np.testing.assert_allclose(distance, [min(row) for row in slow], rtol=1e-14)
 
 
-def test_take_replace_pad_and_concatenate(case):
+def test_rings_are_taken_replaced_padded_and_concatenated_row_by_row(case):
     lists, closed, rings = case
     rows = np.array([7, 3, 3, 39, 0])
     taken = rings.take(rows)

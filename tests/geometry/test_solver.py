@@ -44,7 +44,7 @@ SHAPES = ("torus", "y_junction", "sheet")
 
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("contraction", [0.0, 0.1, 5.0, 100.0, 2048.0])
-def test_against_dense_least_squares(shape, contraction):
+def test_a_solve_is_the_dense_solution_of_least_squares(shape, contraction):
     laplacian, points, size = small_system(shape)
     rows = np.full(len(points), contraction)
     attraction = np.clip(size.mean() / size, 0.2, 5)
@@ -54,7 +54,7 @@ def test_against_dense_least_squares(shape, contraction):
     assert error < 1e-7
 
 
-def test_refinement_mends_what_the_factorisation_misses():
+def test_refinement_corrects_what_the_factorisation_misses():
     """Normal equations of condition 1e14: the plain solution is off by far more than the refined one."""
     n = 60
     rng = np.random.default_rng(3)
@@ -81,14 +81,14 @@ def test_refinement_mends_what_the_factorisation_misses():
         pytest.param(lambda l, r, a, p: (l, 400 * r, 1e-4 * a, p), id="too ill-conditioned"),
     ],
 )
-def test_refuses_what_has_no_trustworthy_solution(spoil):
+def test_a_system_without_a_trustworthy_solution_is_refused(spoil):
     laplacian, points, _ = small_system("torus")
     system = spoil(laplacian, np.full(len(points), 5.0), np.ones(len(points)), points)
     with pytest.raises(SolveError):
         solve_contraction(*system)
 
 
-def test_order_of_elimination_is_kept(monkeypatch):
+def test_the_order_of_elimination_is_kept(monkeypatch):
     """The second system with the same links is solved as the first, without looking for the order again."""
     laplacian, points, size = small_system("torus")
     rows, attraction, elimination = np.full(len(points), 0.5), size.mean() / size, Elimination()
@@ -133,24 +133,3 @@ def test_factors_of_later_systems_have_no_more_entries_than_if_they_were_the_fir
     entries, kept, anew = np.array(sizes).T
     assert entries[1:].max() > entries[0]  # or it would show nothing
     assert (kept <= 1.1 * anew).all()
-
-
-def test_wide_panels_are_for_solids_and_give_the_same(monkeypatch):
-    panels, places, factorised = [], [], module.factorised
-
-    def noted(matrix, *given, panel, **options):
-        panels.append(panel)
-        return factorised(matrix, *given, panel=panel, **options)
-
-    monkeypatch.setattr(module, "factorised", noted)
-    rng = np.random.default_rng(2)
-    for points in (rng.random((16000, 3)), samples.torus(6000).points):
-        state = RingBuilder()(points)
-        system = cotangent_laplacian(state.positions, state.rings), np.ones(len(state)), np.ones(len(state))
-        places.append(solve_contraction(*system, state.positions)[0])
-        monkeypatch.setattr(module, "WIDE_CUT", 10**9)
-        places.append(solve_contraction(*system, state.positions)[0])
-        monkeypatch.undo()
-        monkeypatch.setattr(module, "factorised", noted)
-    assert panels == [module.WIDE_PANEL, *[module.NARROW_PANEL] * 3]
-    np.testing.assert_allclose(places[0], places[1], rtol=0, atol=1e-9)
