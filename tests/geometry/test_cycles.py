@@ -89,17 +89,18 @@ def test_the_inscribed_circle_of_a_shape_is_known(name, size):
     assert np.linalg.norm(centre - middle) < (0.15 if name == "ellipse" else 0.03) * radius * size
 
 
-def test_places_inside_a_polygon_are_on_a_grid_in_its_plane():
-    """Of an L, without its corner."""
-    flat = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]], float)
+@pytest.mark.parametrize(("name", "area"), [("L", 3), ("triangle", 6)])
+def test_places_inside_a_polygon_are_on_a_grid_in_its_plane(name, area):
+    flat = SHAPES[name][0]
     points = np.column_stack([flat, 0 * flat[:, 0]]) @ TURN + 5
     places, axes = places_inside(points, 15)
     np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
     x, y, z = ((places - 5) @ TURN.T).T
     np.testing.assert_allclose(z, 0, atol=1e-12)
-    assert ((x > 0) & (x < 2) & (y > 0) & (y < 2) & ((x < 1) | (y < 1))).all()
+    inside = (x < 2) & (y < 2) & ((x < 1) | (y < 1)) if name == "L" else x / 4 + y / 3 < 1
+    assert ((x > 0) & (y > 0) & inside).all()
     box = np.prod(np.ptp(points @ axes[:2].T, axis=0))
-    assert len(places) / 15**2 == pytest.approx(3 / box, rel=0.05)
+    assert len(places) / 15**2 == pytest.approx(area / box, rel=0.05)
 
 
 def test_a_line_has_no_inscribed_circle():

@@ -41,8 +41,8 @@ def line_ends(markers, rows):
 def test_a_cloud_comes_in_and_markers_and_poses_go_out(ros, cloud, expected, header, sent, rows):
     node = ros.node()
     node.on_cloud(cloud)
-    (there, markers), (topic, poses) = node.published
-    assert (there, topic) == ("~/markers", "~/poses")
+    (first, markers), (second, poses) = node.published
+    assert (first, second) == ("~/markers", "~/poses")
     markers, poses = sent(markers, bag.RESULTS["markers"]), sent(poses, bag.RESULTS["poses"])
     np.testing.assert_array_equal(line_ends(markers, rows), expected.vertices[expected.edges].reshape(-1, 3))
     np.testing.assert_array_equal(rows(pose.position for pose in poses.poses), expected.vertices)
@@ -67,7 +67,7 @@ def test_parameters_choose_pipeline_and_settings(ros, cloud, points, tmp_path, r
     np.testing.assert_array_equal(line_ends(same.published[0][1], rows), line_ends(node.published[0][1], rows))
 
 
-def test_with_an_opening_poses_are_grasps_above_a_table(ros, cloud, expected, rows):
+def test_poses_with_an_opening_are_grasps_above_a_table(ros, cloud, expected, rows):
     for options in ({}, dict(plane=[0.0, 0.0, 1.0, 0.25])):
         node = ros.node(opening=0.6, **options)
         node.on_cloud(cloud)
@@ -92,28 +92,26 @@ def test_a_bad_cloud_is_one_warning_and_the_next_is_served(ros, cloud, header, m
     node.on_cloud(make_message(CLOUD, header=header))
     node.on_cloud(cloud_of(np.full((500, 3), np.nan), header, make_message))
     node.on_cloud(cloud_of(np.eye(3), header, make_message))
-    assert node.logged == [
-        "cloud left out: the cloud has no field x: its fields are none",
-        "cloud left out: the cloud has 0 finite points, and min_points is 100",
-        "cloud left out: the cloud has 3 finite points, and min_points is 100",
-    ]
+    assert [word in line for word, line in zip(("field x", "0 finite", "3 finite"), node.logged, strict=True)] == [
+        True
+    ] * 3
     assert node.published == []
     node.on_cloud(cloud)
     assert len(node.published) == 2
     with monkeypatch.context() as patch:  # an error that nobody has foreseen
         patch.setattr(node, "skeletonizer", lambda cloud: 1 / 0)
         node.on_cloud(cloud)
-    assert node.logged[3:] == ["cloud left out: division by zero"]
+    assert "division by zero" in node.logged[3]
 
 
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        (dict(pipeline="defualt"), "did you mean 'default'"),
+        (dict(pipeline="defualt"), "'default'"),
         (dict(set=["k=no"]), "k = 'no'"),
         (dict(opening=float("nan")), "opening = nan"),
-        (dict(plane=[0.0, 0.0, 1.0]), r"plane = \[0.0, 0.0, 1.0\]: must be a, b, c, d"),
-        (dict(plane=[0.0, 0.0, 1.0, 0.0]), "is for grasps: give the opening"),
+        (dict(plane=[0.0, 0.0, 1.0]), "plane"),
+        (dict(plane=[0.0, 0.0, 1.0, 0.0]), "opening"),
     ],
 )
 def test_wrong_parameters_end_the_node_at_once(ros, parameters, message):
@@ -168,8 +166,8 @@ def test_the_script_does_what_the_node_does(recorded, types, tmp_path, expected,
     assert not (tmp_path / "no").exists()
     bag.main([str(recorded), str(tmp_path / "out"), "--topic", "/points"])
     said = capsys.readouterr()
-    assert said.out == f"2 clouds skeletonised: {tmp_path / 'out'}\n"
-    assert said.err == f"cloud at {2 * SECOND} left out: the cloud has 3 finite points, and min_points is 100\n"
+    assert "2 clouds" in said.out
+    assert f"cloud at {2 * SECOND}" in said.err
     found = messages(tmp_path / "out", types)
     assert [(time, topic) for time, topic, _ in found] == [
         (time * SECOND, f"/skeletonize_node/{name}") for time in (1, 3) for name in ("markers", "poses")
