@@ -52,8 +52,7 @@ def test_branches_of_trees_are_welded_where_they_begin(call, trees, tmp_path):
     np.testing.assert_allclose(truth.radii, 0.3, rtol=0.05)
     call("trees", trees, "-o", tmp_path / "bench", "--only", "tree_small_*")
     assert read_folder(tmp_path / "bench") == made
-    wrong = call("trees", trees, "-o", tmp_path / "bench", "--only", "tree_large_*", code=2)
-    assert "none of 1 shapes is called tree_large_*" in wrong
+    call("trees", trees, "-o", tmp_path / "bench", "--only", "tree_large_*", code=2)
 
 
 @pytest.fixture
@@ -69,7 +68,7 @@ def plants(tmp_path):
     return tmp_path / "data"
 
 
-def test_graphs_of_plants_and_clouds_of_both_kinds(call, plants, tmp_path):
+def test_graphs_of_plants_are_read_with_clouds_of_both_kinds(call, plants, tmp_path):
     out = call("plants", plants, "-o", tmp_path / "bench")
     assert "2 shapes, 2 clouds" in out
     assert "left out" not in out

@@ -5,14 +5,10 @@ import re
 import signal
 import time
 
-import numpy as np
 from glsk_bench import Results, read_folder, read_results
 from glsk_bench import leaderboard as make_leaderboard
 from glsk_bench.scoring import Scores
-from glsk_studies import adapter, board, leaderboard, runs
-from typer.testing import CliRunner
-
-from glsk_o3d import read_skeleton
+from glsk_studies import board, leaderboard, runs
 
 STUDY = leaderboard
 
@@ -62,22 +58,17 @@ class TestKept:
 
 
 class TestCommands:
-    def test_run_keeps_the_scores_and_goes_on(self, call, small, tmp_path, monkeypatch):
+    def test_a_run_keeps_its_scores(self, call, small, tmp_path, monkeypatch):
         monkeypatch.setattr(leaderboard, "make", lambda place, version, jobs: read_folder(place))
         monkeypatch.setattr(board, "KEPT", tmp_path)
         assert "default.json.gz: 0 failures" in call("run", tmp_path, "--tool", "default", "--jobs", 2)
         rows = read_results(tmp_path / "v1" / "default.json.gz").rows
         assert len(rows) == 7
         assert all(each["topology"] for each in rows)
-        written = {path: path.stat().st_mtime_ns for path in (tmp_path / "default").glob("*.npz")}
-        call("run", tmp_path, "--tool", "default", "--jobs", 2)
-        assert written == {path: path.stat().st_mtime_ns for path in (tmp_path / "default").glob("*.npz")}
         kept = (tmp_path / "v1" / "default.json.gz").read_bytes()
         assert "default.json.gz: 0 failures" in call("run", tmp_path, "--there")
         assert (tmp_path / "v1" / "default.json.gz").read_bytes() == kept
         assert "no answers of cgal" in " ".join(call("run", tmp_path, "--there", "--tool", "cgal", code=2).split())
-        call("picture", tmp_path, tmp_path / "p.png", "--cloud", "tubes_100_clean", "--tool", "default,cgal")
-        assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
 
     def test_pages_are_filled_or_all_is_printed(self, call, tmp_path, monkeypatch):
         monkeypatch.setattr(leaderboard, "kept", lambda version: entries(default=[row()]) if version == "v1" else [])
@@ -102,21 +93,6 @@ class TestCommands:
         _, header, (line,) = board.repeated([found])
         cells = dict(zip(header, line, strict=True))
         assert (cells[""], cells["loops"], cells["failures"]) == ("`default`", "1.00 [1.00, 1.00]", "0")
-
-
-class TestTools:
-    def test_the_adapter_goes_from_a_file_to_a_file_whatever_points_up(self, tmp_path):
-        """Level sets begin at the lowest point: turned with the cloud, they are the same."""
-        points = np.random.default_rng(0).normal(scale=[0.05, 0.05, 1.0], size=(500, 3))
-        found = {}
-        for up, turn in (("y", [1, 2, 0]), ("z", [0, 1, 2])):
-            np.savetxt(tmp_path / f"{up}.xyz", points[:, turn])
-            words = ["levels", tmp_path / f"{up}.xyz", tmp_path / f"{up}.obj", "--up", up]
-            assert CliRunner().invoke(adapter.app, [*map(str, words)]).exit_code == 0
-            found[up] = read_skeleton(tmp_path / f"{up}.obj").vertices[:, np.argsort(turn)]
-        for wrong in (["magic", "c.xyz", "s.obj"], ["levels", "c.xyz", "s.obj", "--up", "w"]):
-            assert CliRunner().invoke(adapter.app, wrong).exit_code == 2
-        np.testing.assert_allclose(found["y"], found["z"], atol=1e-12)
 
 
 def crash_or_work(job):
