@@ -28,18 +28,7 @@ class TestLabels:
         assert placed.is_handle(np.arange(17)[::-1])
         assert not placed.is_handle(np.array([*range(10), *range(8, 0, -1)]))
 
-    def test_the_handle_of_a_pot_is_one_if_the_loop_goes_through_the_wall(self):
-        """From one foot to the other the way along the handle is shorter than that through the middle of the pot."""
-        handle = [(0.9, -0.3, 0), (1.5, -0.3, 0), (1.5, 0.3, 0), (0.9, 0.3, 0)]
-        nodes = np.array([(0, -1, 0), (0, -0.3, 0), (0, 0.3, 0), (0, 1, 0), *handle])
-        edges = np.array([(0, 1), (1, 2), (2, 3), (1, 4), (4, 5), (5, 6), (6, 7), (7, 2)])
-        pot = Truth(nodes, edges, np.array([1.0, 1, 1, 1, 0.05, 0.05, 0.05, 0.05]))
-        loop = np.array([(1.02, -0.3, 0), *handle[1:3], (1.02, 0.3, 0)])
-        assert questions.Placed(pot, loop).is_handle(np.arange(4))
-        to_and_fro = np.array([(0.9, -0.3, 0), (1.5, -0.3, 0), (1.5, 0, 0), (1.5, -0.25, 0)])
-        assert not questions.Placed(pot, to_and_fro).is_handle(np.arange(4))
-
-    def test_asks_what_the_refiner_asks(self):
+    def test_questions_are_those_of_the_refiner(self):
         """Of the same skeletons: what a clean cloud is asked has the probabilities that the report has."""
         cloud, pipeline = y_junction(1200), default()
         found = [*questions.asked(cloud.points, Truth(cloud.nodes, cloud.edges, cloud.radii), pipeline)]
@@ -77,7 +66,7 @@ class TestArithmetic:
 
 
 class TestCommands:
-    def test_on_tiny_clouds(self, call, small, tmp_path):
+    def test_weights_are_fitted_checked_and_transferred(self, call, small, tmp_path):
         saved, page = tmp_path / "questions.json", tmp_path / "page.md"
         few = ("--builtin", "--shapes", "torus,y_junction", "--variant", "clean_512,noise2_512", "--jobs", 0)
         printed = call("fit", *few, "-o", saved)

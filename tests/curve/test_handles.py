@@ -91,20 +91,6 @@ def test_the_curve_of_a_cup_leaves_its_body_in_the_handle_only(seed, lid):
         np.testing.assert_allclose(np.hypot(*gaps[:, 1, :2].T), BODY, atol=0.1)
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_a_bail_is_followed_until_it_meets_a_long_body(seed):
-    """The walls of a basket that lies are twice as far away as it is wide, and its bail leaves along them."""
-    body = np.array([[-0.3, 0, 0], [0.3, 0, 0]])
-    turn = np.linspace(0, np.pi, 25)
-    bail = np.column_stack([0.6 * np.cos(turn), 0 * turn, 0.2 + 0.8 * np.sin(turn)])
-    skeleton = skeletonize(joined((body, BODY), (bail, 0.05), seed=seed))
-    assert skeleton.n_loops == 1
-    curve = curve_of(skeleton)
-    from_body = np.linalg.norm(curve - np.clip(curve, body[0], body[1]), axis=1)
-    assert np.minimum(from_body / BODY, cKDTree(bail).query(curve)[0] / 0.08).max() < 1
-    assert skeleton.edge_lengths.min() > 0.05 * HANDLE
-
-
 def ring(radii, beads=(), seed=0):
     """Points of a ring of radius 1, as thick as this at 64 places, with balls on it: pairs of an angle and a radius."""
     turn = np.append(np.linspace(0, 2 * np.pi, 64, endpoint=False), [angle for angle, _ in beads])

@@ -44,3 +44,10 @@ def test_a_gap_ahead_is_joined_before_a_narrower_one_to_the_side():
     _, added = join_pieces(lines, near_links(lines), np.full(120, np.inf))
     assert [39, 40] in np.sort(added).tolist()
     assert (np.abs(lines[added[:, 0], 1] - lines[added[:, 1], 1]) > 4).sum() == 1
+
+
+@pytest.mark.parametrize(("near", "far", "joined"), [(6, 0, 1), (0, 6, 1), (5.9, 5.9, 0)])
+def test_a_gap_is_joined_if_it_is_short_enough_for_one_of_its_ends(near, far, joined):
+    lines = np.concatenate([LINE, LINE + [45, 0, 0]])
+    _, added = join_pieces(lines, near_links(lines), np.repeat([near, far], 40))
+    assert len(added) == joined

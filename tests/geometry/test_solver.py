@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
-from glsk_o3d import Contractor, samples
+from glsk_o3d import samples
 from glsk_o3d.filters.ring_builder import RingBuilder
 from glsk_o3d.geometry import solver as module
 from glsk_o3d.geometry.cotangent import cotangent_laplacian
@@ -103,33 +103,3 @@ def test_the_order_of_elimination_is_kept(monkeypatch):
     alone, _ = solve_contraction(laplacian, 3 * rows, attraction, points)
     assert ordered == [(True,), (False,)]
     np.testing.assert_allclose(x, alone, rtol=0, atol=1e-9)
-
-
-def right_angled(kind, rng):
-    """Points on a grid, whose cotangents are exactly 0 until they have moved."""
-    if kind == "mesh":
-        turn, row = np.meshgrid(np.arange(int(rng.integers(20, 40))), np.arange(40.0))
-        angle = 2 * np.pi * turn.ravel() / (turn.max() + 1)
-        return np.column_stack([np.cos(angle), np.sin(angle), row.ravel() * (angle[1] - angle[0])])
-    sides = rng.integers(9, 16, 3) + [0, 0, 30]
-    points = np.stack(np.meshgrid(*map(np.arange, sides)), -1).reshape(-1, 3)
-    return points[((points == 0) | (points == sides - 1)).any(axis=1)].astype(float)
-
-
-@pytest.mark.parametrize("kind", ["shell", "mesh"])
-@pytest.mark.parametrize("seed", range(3))
-def test_factors_of_later_systems_have_no_more_entries_than_if_they_were_the_first(kind, seed, monkeypatch):
-    """Weights of the first system are exactly 0 on a grid, and those of later ones are not."""
-    sizes, factorised = [], module.factorised
-
-    def counted(matrix, *given, **options):
-        factor = factorised(matrix, *given, **options)
-        sizes.append((matrix.nnz, factor.nnz, factorised(matrix, Equil=False).nnz))
-        return factor
-
-    monkeypatch.setattr(module, "factorised", counted)
-    state = RingBuilder()(right_angled(kind, np.random.default_rng(seed)))
-    Contractor(max_iterations=4)(state)
-    entries, kept, anew = np.array(sizes).T
-    assert entries[1:].max() > entries[0]  # or it would show nothing
-    assert (kept <= 1.1 * anew).all()
