@@ -10,7 +10,7 @@ from glsk_o3d.curve.curve import Curve
 from glsk_o3d.curve.merging import drop_edges, drop_vertices
 from glsk_o3d.curve.surface import Surface
 from glsk_o3d.curve.topology.false_branches import FalseBranches
-from glsk_o3d.curve.topology.gaps import Gaps
+from glsk_o3d.curve.topology.gaps import Gaps, gap_facts
 from glsk_o3d.curve.topology.loops import Loops
 from glsk_o3d.curve.topology.question import Candidate, Question, ask
 from glsk_o3d.curve.topology.spurs import Limbs
@@ -160,6 +160,14 @@ def test_a_gap_is_asked_about_if_an_end_points_across_it(piped, refine):
     assert asked([(-1, 0, 0), (-0.6, 0, 0)], [(0.6, 0, 0), (1, 0, 0)]) == 0
     assert asked([(-1, 0, 0), (0, 0, 0)], [(-1, 0.3, 0), (0, 0.3, 0)]) == 0  # side by side
     assert asked([(-1, 0, 0), (0.1, 0, 0), (0.1, 0.25, 0), (0, 0.25, 0), (0, 0.15, 0)]) == 0  # a hook
+
+
+def test_an_end_points_at_what_is_ahead_rather_than_at_what_is_a_little_nearer(piped, evidence):
+    aside = np.array([-0.2, 0, 0]) + 0.35 * (np.cos(np.radians(50)) * X + np.sin(np.radians(50)) * Y)
+    raw = piped([[(-1, 0, 0), (-0.2, 0, 0)], [(0.2, 0, 0), (1, 0, 0)], [aside, aside + 0.5 * X + 0.9 * Y]])
+    pairs = [raw.vertices[list(pair)] for pair, _ in gap_facts(evidence(raw)) if (raw.degree[list(pair)] == 1).all()]
+    (aim,) = (other for leaf, other in pairs if leaf[0] == -0.2)
+    np.testing.assert_array_equal(aim, [0.2, 0, 0])
 
 
 def test_every_end_is_joined_once(piped, refine):
