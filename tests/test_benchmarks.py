@@ -21,10 +21,10 @@ FEW = ("--builtin", "--shapes", "torus", "--variant", "clean_512", "--jobs", 0)
 
 
 def row(shape="torus", variant="clean_512", pipeline="default", **values):
-    found = dict(error=0.1, inside=1.0, completeness=1.0, length=1.0, ends=None, radius_error=0.05, cpu=0.2)
-    found |= dict(tips_f1=1.0, junctions_f1=1.0, components=0, loops=0, leaves=0, junctions=0)
-    found |= dict(topology=True, perfect=True, family="built-in", seed=None, draw=0)
-    return dict(shape=shape, variant=variant, pipeline=pipeline) | found | values
+    scores = dict(error=0.1, inside=1.0, completeness=1.0, length=1.0, ends=None, radius_error=0.05, cpu=0.2)
+    scores |= dict(tips_f1=1.0, junctions_f1=1.0, components=0, loops=0, leaves=0, junctions=0)
+    scores |= dict(topology=True, perfect=True, family="built-in", seed=None, draw=0)
+    return dict(shape=shape, variant=variant, pipeline=pipeline) | scores | values
 
 
 def failed(shape, variant="clean_512", pipeline="default", **values):
@@ -71,8 +71,8 @@ class TestArithmetic:
         pairs = axes.paired([*before, row("gone")], after)
         assert capsys.readouterr().err == "left out: 1 clouds that only one file has\n"
         ((_, header, (line,)),) = axes.difference_tables(pairs)
-        told = dict(zip(header[-2:], line[-2:], strict=True))
-        assert told == {"now right": ", ".join(names[10:19]), "now wrong": "rings_0, rings_3"}
+        recorded = dict(zip(header[-2:], line[-2:], strict=True))
+        assert recorded == {"now right": ", ".join(names[10:19]), "now wrong": "rings_0, rings_3"}
         assert line[:4] == ["clean_512", "`default`", "20", "0.50 → 0.85"]
         assert line[4].startswith("+0.35 [+0.05, +0.6")
         assert line[5] == "1.00 → 0.95"
@@ -94,8 +94,8 @@ def test_all_ideas_off_are_the_publications():
 
     assert override(pipelines.default(), wen).stages == with_idle(pipelines.wen2024)
     absent = ("LPRReducer.", "ExplainedScore.")
-    left = (setting for setting in chain.from_iterable(off.values()) if not setting.startswith(absent))
-    without = override(pipelines.default(), [*left, "Contractor.reducer=none", "Contractor.max_iterations=20"])
+    settings = (setting for setting in chain.from_iterable(off.values()) if not setting.startswith(absent))
+    without = override(pipelines.default(), [*settings, "Contractor.reducer=none", "Contractor.max_iterations=20"])
     assert without.stages == with_idle(pipelines.cao2010)
 
 
@@ -106,10 +106,10 @@ class TestCommands:
         printed = call("truth", *zoo, *words, "-o", saved[0], "--jobs", 1)
         assert "| clean_512 | `default` | 4 | 1.00 [1.00, 1.00] | 1.00 [1.00, 1.00] |" in printed
         assert "| rings | `default` | 6 | " in printed
-        told = json.loads(saved[0].read_text())
-        assert {"commit", "machine", "versions", "command"} < set(told)
-        assert len(told["rows"]) == 8
-        assert all(row["perfect"] and row["cpu"] > 0 for row in told["rows"])
+        recorded = json.loads(saved[0].read_text())
+        assert {"commit", "machine", "versions", "command"} < set(recorded)
+        assert len(recorded["rows"]) == 8
+        assert all(row["perfect"] and row["cpu"] > 0 for row in recorded["rows"])
         call("truth", *zoo, *words, "-o", saved[1], "--set", "Contractor.max_iterations=1", "--jobs", 0)
         assert {row["solves"] for row in json.loads(saved[1].read_text())["rows"]} == {1}
         compared = call("compare", *saved, "--markdown")
@@ -156,5 +156,5 @@ def test_damaged_scans_fail_and_the_others_are_done(tmp_path):
 
 
 def test_an_option_is_measured():
-    found = options.measure("`torus`", "Refiner.spacing=1", 0)
-    assert (found["topology"], found["leaves"]) == (True, 0)
+    measures = options.measure("`torus`", "Refiner.spacing=1", 0)
+    assert (measures["topology"], measures["leaves"]) == (True, 0)

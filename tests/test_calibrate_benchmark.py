@@ -31,11 +31,11 @@ class TestLabels:
     def test_questions_are_those_of_the_refiner(self):
         """Of the same skeletons: what a clean cloud is asked has the probabilities that the report has."""
         cloud, pipeline = y_junction(1200), default()
-        found = [*questions.asked(cloud.points, Truth(cloud.nodes, cloud.edges, cloud.radii), pipeline)]
-        told = [(about, bool(is_so)) for about, _, is_so in found]
-        assert told.count(("limb", True)) == 3
-        assert not {("limb", False), ("air", True)} & {*told}
-        asked = [(about, logistic(calibrate.ASKED[about].weights, facts)) for about, facts, _ in found]
+        questions_asked = [*questions.asked(cloud.points, Truth(cloud.nodes, cloud.edges, cloud.radii), pipeline)]
+        answers = [(about, bool(is_so)) for about, _, is_so in questions_asked]
+        assert answers.count(("limb", True)) == 3
+        assert not {("limb", False), ("air", True)} & {*answers}
+        asked = [(about, logistic(calibrate.ASKED[about].weights, facts)) for about, facts, _ in questions_asked]
         assert sorted(asked) == sorted((it.about, it.probability) for it in pipeline(cloud.points).report.decisions)
 
 
@@ -80,8 +80,8 @@ class TestCommands:
 
         page.write_text("<!-- check -->\n<!-- end -->\n<!-- transfer -->\n<!-- end -->\n")
         (tmp_path / "images").mkdir()
-        told = call("check", saved, "--markdown", "--page", page)
-        assert told.count("| a branch is a limb |") == 3
+        answers = call("check", saved, "--markdown", "--page", page)
+        assert answers.count("| a branch is a limb |") == 3
         assert page.read_text().count("| a branch is a limb |") == 3
         assert (tmp_path / "images" / "probabilities.png").read_bytes().startswith(b"\x89PNG")
         call("transfer", saved, small.path, "--jobs", 0, "--page", page)

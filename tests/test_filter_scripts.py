@@ -41,7 +41,7 @@ def test_scan_cleanup_drops_copies_and_far_points(root, scale):
 
 @pytest.mark.parametrize("name", sorted(set(scripts()) - {"scan_cleanup"}))
 def test_scripts_of_our_filters_fit_every_scale(name):
-    found = []
+    results = []
     for scale in (1.0, 2.0**-10):
         meshes = glsk_o3d.MeshSet()
         meshes.add_points(scale * samples.torus(1000).points)
@@ -49,9 +49,9 @@ def test_scripts_of_our_filters_fit_every_scale(name):
         meshes.apply_filter_script()
         layers = (meshes.layer(number) for number in range(meshes.mesh_number()))
         skeleton = next(layer for layer in layers if layer.is_skeleton).to_skeleton()
-        found.append((skeleton.n_components, skeleton.n_loops, skeleton.length / scale))
-    assert found[0][:2] == (1, 1)
-    assert found[1] == pytest.approx(found[0], rel=1e-3)
+        results.append((skeleton.n_components, skeleton.n_loops, skeleton.length / scale))
+    assert results[0][:2] == (1, 1)
+    assert results[1] == pytest.approx(results[0], rel=1e-3)
 
 
 @pytest.mark.parametrize("name", scripts())

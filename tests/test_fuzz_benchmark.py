@@ -11,8 +11,8 @@ STUDY = fuzz
 
 @pytest.mark.parametrize(("what", "cases"), [("arrays", 8), ("files", 80)])
 def test_a_few_cases_have_no_findings(call, what, cases):
-    told = call(what, "--runs", cases, "--seed", 1)
-    _, *counts, findings = told.strip().splitlines()[-1].split()
+    printed = call(what, "--runs", cases, "--seed", 1)
+    _, *counts, findings = printed.strip().splitlines()[-1].split()
     assert int(findings) == 0
     assert sum(map(int, counts)) == cases
     assert int(counts[-1]) > 0

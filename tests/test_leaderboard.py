@@ -17,8 +17,8 @@ SHARES = ("perfect", "topology", "tips_f1", "junctions_f1")
 
 def row(shape="tubes_100", variant="clean", **values):
     facts = dict(shape=shape, variant=variant, family=shape.partition("_")[0], seconds=1.0)
-    found = dict.fromkeys(Scores.__dataclass_fields__, 0) | dict.fromkeys(SHARES, 1.0) | dict(failure=None)
-    return facts | found | dict(error=0.1, inside=1.0, completeness=1.0, ends=0.2, length=1.0) | values
+    scores = dict.fromkeys(Scores.__dataclass_fields__, 0) | dict.fromkeys(SHARES, 1.0) | dict(failure=None)
+    return facts | scores | dict(error=0.1, inside=1.0, completeness=1.0, ends=0.2, length=1.0) | values
 
 
 def entries(**rows):
@@ -32,14 +32,14 @@ class TestTables:
         better = [row(it, error=0.1, topology=0.0, ends=0.1) for it in shapes]
         now_and_then = [row(it, error=0.1 if i % 3 else 0.35) for i, it in enumerate(shapes)]
         hardly = [row(it, error=0.1999) for it in shapes]
-        found = board.worse(entries(default=ours, cgal=better, pygel=now_and_then, thinning=hardly))
-        lines = board.losses(found)[2]
+        worse = board.worse(entries(default=ours, cgal=better, pygel=now_and_then, thinning=hardly))
+        lines = board.losses(worse)[2]
         assert [line[0] for line in lines] == ["all", "clean", "tubes"]
         assert lines[0][1:] == ["12", "error", "CGAL of wrap", "0.100", "0.200", "-0.100 [-0.100, -0.100]"]
-        _, low, high = found[1].difference
-        assert found[1][:4] == ("all", "pygel", "error", 12)
+        _, low, high = worse[1].difference
+        assert worse[1][:4] == ("all", "pygel", "error", 12)
         assert low < -0.017 < 0 < high
-        assert board.unclear(found)[2] == [
+        assert board.unclear(worse)[2] == [
             ["error", "PyGEL3D of coarser wrap", "all (-0.017), clean (-0.017), tubes (-0.017)"]
         ]
 
@@ -49,12 +49,12 @@ class TestKept:
         names = ("README.md", "docs/comparison.md", "docs/comparison_tables.md")
         pages = "".join((root / name).read_text(encoding="utf-8") for name in names)
         for version in leaderboard.PARTS:
-            found = board.kept(version)
-            rows = make_leaderboard(entry.results for entry in found).entries if found else []
-            for name, text in leaderboard.pieces(version, found, rows).items():
-                there = re.search(rf"<!-- {name} -->\n(.*?)<!-- end -->", pages, re.S)[1].strip()
+            kept = board.kept(version)
+            rows = make_leaderboard(entry.results for entry in kept).entries if kept else []
+            for name, text in leaderboard.pieces(version, kept, rows).items():
+                shown = re.search(rf"<!-- {name} -->\n(.*?)<!-- end -->", pages, re.S)[1].strip()
                 if name != "recorded":  # late solves of wen2024 round otherwise elsewhere
-                    assert there == text.strip()
+                    assert shown == text.strip()
 
 
 class TestCommands:
@@ -88,9 +88,9 @@ class TestCommands:
         words = ("--tool", "default", "--version", "v1", "--draws", 2)
         assert "repeat_things.json.gz: default: moved 0." in call("repeat", tmp_path, *words)
         assert len([*tmp_path.glob("repeat_things/default/*.npz")]) == 12
-        (found,) = board.repeats("v1", "things")
-        assert [each["draws"] for each in found.rows] == [2] * 6
-        _, header, (line,) = board.repeated([found])
+        (repeats,) = board.repeats("v1", "things")
+        assert [each["draws"] for each in repeats.rows] == [2] * 6
+        _, header, (line,) = board.repeated([repeats])
         cells = dict(zip(header, line, strict=True))
         assert (cells[""], cells["loops"], cells["failures"]) == ("`default`", "1.00 [1.00, 1.00]", "0")
 

@@ -194,9 +194,9 @@ def test_the_default_finds_the_axis_of_known_shapes(shape, components, loops, le
     sample = samples.SAMPLES[shape](n=2048)
     skeleton = skeletonize(sample.points)
     assert (skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)) == (components, loops, leaves)
-    found = compare(skeleton, sample)
-    assert found.error < 0.1
-    assert found.inside == found.completeness == 1
+    measures = compare(skeleton, sample)
+    assert measures.error < 0.1
+    assert measures.inside == measures.completeness == 1
     assert np.median(skeleton.radii) == pytest.approx(sample.radii.mean(), rel=0.1)
 
 
@@ -227,8 +227,8 @@ def test_a_skeleton_turns_with_its_cloud_in_any_order(name):
     still, turned = skeletonize(points), skeletonize(points[order] @ turn)
     size = 1e-6 * np.ptp(points, axis=0).max()
     assert len(turned.vertices) == len(still.vertices)
-    apart, place = cKDTree(still.vertices).query(turned.vertices @ turn.T)
-    assert apart.max() < size
+    distance, place = cKDTree(still.vertices).query(turned.vertices @ turn.T)
+    assert distance.max() < size
     assert sorted(place) == list(range(len(still.vertices)))
     edges = np.sort(place[turned.edges], axis=1)
     np.testing.assert_array_equal(edges[np.lexsort(edges.T[::-1])], still.edges)

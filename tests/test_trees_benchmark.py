@@ -28,10 +28,10 @@ class TestScores:
         """Its diagonal is 1: all of the half is right, and half of the line is there."""
         whole = forest.skeleton_of(np.array([[0, 0, 0], [1.0, 0, 0]]), np.array([[0, 1]]))
         half = forest.skeleton_of(np.array([[0, 0, 0], [0.5, 0, 0]]), np.array([[0, 1]]))
-        found = forest.score(np.array([[0, 0, 0], [1.0, 0, 0]]), whole, half)
-        assert found["precision"] == 1
-        assert found["recall"] == pytest.approx(0.51, abs=0.003)
-        assert found["completeness"] == pytest.approx(100 / 8, rel=0.01)
+        scores = forest.score(np.array([[0, 0, 0], [1.0, 0, 0]]), whole, half)
+        assert scores["precision"] == 1
+        assert scores["recall"] == pytest.approx(0.51, abs=0.003)
+        assert scores["completeness"] == pytest.approx(100 / 8, rel=0.01)
 
 
 START = np.array([[0, 0, 0.5], [0, 0, 2.5], [0, 0, 2.5]])
@@ -69,12 +69,12 @@ class TestModels:
         return written(path, names, columns)
 
     def test_measures_are_those_of_the_cylinders(self, model):
-        found = forest.read_cylinder_model(model)
-        assert found.height == pytest.approx(4)
-        assert found.stem_diameter == pytest.approx(0.4)
-        assert found.volume == pytest.approx(np.pi * (0.04 * 2 + 0.0225 * 2 + 0.01 * 2.5))
-        assert found.order.tolist() == [0, 0, 1]
-        np.testing.assert_allclose(found.end, END)
+        measures = forest.read_cylinder_model(model)
+        assert measures.height == pytest.approx(4)
+        assert measures.stem_diameter == pytest.approx(0.4)
+        assert measures.volume == pytest.approx(np.pi * (0.04 * 2 + 0.0225 * 2 + 0.01 * 2.5))
+        assert measures.order.tolist() == [0, 0, 1]
+        np.testing.assert_allclose(measures.end, END)
 
 
 class TestCommands:

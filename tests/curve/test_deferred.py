@@ -83,14 +83,14 @@ def comb(n=24, more=()):
 
 def seen(monkeypatch):
     """What is set aside from now on."""
-    found, look = [], Deferred.of
+    results, look = [], Deferred.of
 
     def watch(*args):
-        found.append(look(*args))
-        return found[-1]
+        results.append(look(*args))
+        return results[-1]
 
     monkeypatch.setattr(Deferred, "of", watch)
-    return found
+    return results
 
 
 def test_points_without_a_vertex_stay_without_one():

@@ -37,11 +37,11 @@ def test_a_few_flying_points_are_no_part(n, size):
     tube, rng = samples.tube(3000, length=2, radius=0.1).points, np.random.default_rng(n)
     cloud = np.concatenate([tube, tube.mean(axis=0) + [0, 1, 0] + size * rng.normal(size=(n, 3))])
     assert pipelines.default().with_options(air=0)(cloud).n_components == 2
-    found = pipelines.default()(cloud)
-    assert (found.n_components, found.n_loops, len(found.leaves)) == (1, 0, 2)
-    assert found.report.n_outliers >= n
-    assert np.isnan(found.normals[-n:]).all()
-    assert (found.vertex_of_point >= 0).all()
+    skeleton = pipelines.default()(cloud)
+    assert (skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)) == (1, 0, 2)
+    assert skeleton.report.n_outliers >= n
+    assert np.isnan(skeleton.normals[-n:]).all()
+    assert (skeleton.vertex_of_point >= 0).all()
 
 
 def clumps(*counts, edges=()):
@@ -67,7 +67,7 @@ def clumps(*counts, edges=()):
 )
 def test_a_detached_clump_of_few_points_is_no_part(counts, edges, remaining):
     skeleton = clumps(*counts, edges=edges)
-    found = without_detached_clumps(skeleton)
-    assert len(found.vertices) == remaining
-    gone = found.report.n_outliers
-    assert gone == sum(counts) - len(found.supporting_points) == np.isnan(found.normals[:, 0]).sum()
+    cleaned = without_detached_clumps(skeleton)
+    assert len(cleaned.vertices) == remaining
+    n_outliers = cleaned.report.n_outliers
+    assert n_outliers == sum(counts) - len(cleaned.supporting_points) == np.isnan(cleaned.normals[:, 0]).sum()

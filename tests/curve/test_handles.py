@@ -27,8 +27,8 @@ def joined(*parts, n=4096, seed=0):
         nodes.append(axis)
         edges.append(np.column_stack([k[:-1], k[1:]]))
         radii.append(np.full(len(k), radius))
-    made = (np.concatenate(each) for each in (nodes, edges, radii))
-    return union_sample("parts", *made, n, 0.0, seed).points
+    graph = (np.concatenate(each) for each in (nodes, edges, radii))
+    return union_sample("parts", *graph, n, 0.0, seed).points
 
 
 def curve_of(skeleton):

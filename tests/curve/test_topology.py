@@ -69,8 +69,8 @@ def test_a_spur_goes_whole_and_nothing_else(piped, refine, assert_unchanged):
     np.testing.assert_array_equal(skeleton.vertex_of_point[~kept[owner]], place)  # the fork takes its points
     places = skeleton.vertices[skeleton.vertex_of_point[kept[owner]]]
     np.testing.assert_allclose(places, raw.vertices[owner[kept[owner]]], atol=1e-12)
-    (gone,) = skeleton.report.decisions
-    for least, leaves in ((gone.probability - 1e-9, 3), (gone.probability + 1e-9, 2)):
+    (decision,) = skeleton.report.decisions
+    for least, leaves in ((decision.probability - 1e-9, 3), (decision.probability + 1e-9, 2)):
         assert len(refine(raw, limb=least).leaves) == leaves
     assert_unchanged(refine(stays, limb=0.25), stays)
 
@@ -268,12 +268,12 @@ def test_a_question_repeats_until_nothing_changes(piped, evidence, monkeypatch, 
     monkeypatch.setattr(RightEnds, "repeats", repeats)
     path = piped([[(-2, 0, 0), (2, 0, 0)]], step=1)
     given = evidence(path)
-    found, decisions = ask(RightEnds(), given.curve, given.surface, 0.1)
+    cut, decisions = ask(RightEnds(), given.curve, given.surface, 0.1)
     assert [it.place[0] for it in decisions] == places
     assert [it.changed for it in decisions] == [x > 0.4 for x in places]
     assert [it.probability for it in decisions] == [x / 4 for x in places]
-    assert found.vertices[:, 0].tolist() == np.arange(-2, 3 - n_cut).tolist()
-    assert len(found.vertex_of_point) == len(path.points)
-    same, decisions = ask(RightEnds(), found, given.surface, 0.6)
-    assert same is found
+    assert cut.vertices[:, 0].tolist() == np.arange(-2, 3 - n_cut).tolist()
+    assert len(cut.vertex_of_point) == len(path.points)
+    same, decisions = ask(RightEnds(), cut, given.surface, 0.6)
+    assert same is cut
     assert not any(it.changed for it in decisions)

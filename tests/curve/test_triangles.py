@@ -47,12 +47,12 @@ def test_triangles_collapse_at_the_cheapest_edge(random_skeleton, refine, seed, 
     assert len(skeleton.vertices) == len(members)
     assert skeleton.n_components == raw.n_components
     # merged vertices are numbered by any member: find them by place
-    left = sorted(members)
-    at = [int(np.argmin(np.linalg.norm(skeleton.vertices - position[v], axis=1))) for v in left]
-    assert sorted(at) == list(range(len(left)))
-    np.testing.assert_allclose(skeleton.vertices[at], [position[v] for v in left], atol=1e-12)
-    new = dict(zip(left, at, strict=True))
-    edges = {(min(new[a], new[b]), max(new[a], new[b])) for a in left for b in links[a]}
+    remaining = sorted(members)
+    at = [int(np.argmin(np.linalg.norm(skeleton.vertices - position[v], axis=1))) for v in remaining]
+    assert sorted(at) == list(range(len(remaining)))
+    np.testing.assert_allclose(skeleton.vertices[at], [position[v] for v in remaining], atol=1e-12)
+    new = dict(zip(remaining, at, strict=True))
+    edges = {(min(new[a], new[b]), max(new[a], new[b])) for a in remaining for b in links[a]}
     assert {tuple(e) for e in skeleton.edges.tolist()} == edges
     vertex = {v: new[group] for group, inside in members.items() for v in inside} | {-1: -1}
     np.testing.assert_array_equal(skeleton.vertex_of_point, [vertex[v] for v in raw.vertex_of_point.tolist()])

@@ -43,8 +43,8 @@ HAND_MADE = {
 def test_counts_and_branches_of_hand_made_graphs_are_known(which):
     m, edges, counts, branches = HAND_MADE[which]
     skeleton = skeleton_of(m, edges)
-    found = skeleton.n_components, skeleton.n_loops, len(skeleton.leaves), len(skeleton.junctions)
-    assert found == counts
+    actual = skeleton.n_components, skeleton.n_loops, len(skeleton.leaves), len(skeleton.junctions)
+    assert actual == counts
     assert sorted(map(len, skeleton.branches)) == branches
     for count, name in zip(counts, ("components", "loops", "leaves", "junctions"), strict=True):
         assert f"{count} {name}" in repr(skeleton)

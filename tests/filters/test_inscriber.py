@@ -26,8 +26,8 @@ def plate(hole, high, holes=3, n=4096, seed=0):
     wall, face = lengths.sum() * high, 2 * (length * width - holes * hole**2)
     on_wall = rng.random(2 * n) < wall / (wall + face)
     side = rng.choice(len(sides), 2 * n, p=lengths / lengths.sum())
-    there = sides[side, 0] + rng.random((2 * n, 1)) * (sides[side, 1] - sides[side, 0])
-    x = np.where(on_wall[:, None], there, rng.random((2 * n, 2)) * [length, width])
+    on_walls = sides[side, 0] + rng.random((2 * n, 1)) * (sides[side, 1] - sides[side, 0])
+    x = np.where(on_wall[:, None], on_walls, rng.random((2 * n, 2)) * [length, width])
     z = np.where(on_wall, rng.random(2 * n), rng.integers(0, 2, 2 * n)) * high
     in_hole = ((x[:, :1] > starts) & (x[:, :1] < starts + hole)).any(axis=1) & (np.abs(x[:, 1] - width / 2) < hole / 2)
     points = np.column_stack([x, z])[on_wall | ~in_hole][:n]

@@ -43,10 +43,10 @@ def test_weights_of_a_sample_tell_a_surface_from_floating_points():
     gas = floating(2500)
     kept, _, counts = sample_grid(np.concatenate([dense, gas]), 12000)
     points, true = np.concatenate([dense, gas])[kept], kept < len(dense)
-    found = np.ones(len(kept), bool)
-    found[inlying(points, counts)] = False
-    assert not found[true].any()
-    assert found[~true].mean() > 0.99
+    actual = np.ones(len(kept), bool)
+    actual[inlying(points, counts)] = False
+    assert not actual[true].any()
+    assert actual[~true].mean() > 0.99
 
 
 def test_outliers_do_not_depend_on_pose_scale_and_order():

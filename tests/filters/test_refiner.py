@@ -70,13 +70,13 @@ def test_a_sample_of_many_points_centres_the_curve(assert_sound):
     rows = surface_sample(Curve.of(raw))
     assert len(rows) < 21000
     assert np.count_nonzero(points[rows, 0] > 2.1) == np.count_nonzero(points[:, 0] > 2.1)
-    found = refined(raw, glsk.Refiner())
-    assert_sound(found, n, n_dropped=1)
-    assert (found.n_components, found.n_loops, len(found.leaves)) == (1, 0, 2)
-    assert np.abs(found.vertices[:, 1:]).max() < 0.01
-    assert np.flatnonzero(found.vertex_of_point < 0).tolist() == [5]
-    apart = np.abs(points[:, 0] - found.vertices[found.vertex_of_point, 0])
-    assert np.nanquantile(apart, 0.99) < 0.12
+    skeleton = refined(raw, glsk.Refiner())
+    assert_sound(skeleton, n, n_dropped=1)
+    assert (skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)) == (1, 0, 2)
+    assert np.abs(skeleton.vertices[:, 1:]).max() < 0.01
+    assert np.flatnonzero(skeleton.vertex_of_point < 0).tolist() == [5]
+    distance = np.abs(points[:, 0] - skeleton.vertices[skeleton.vertex_of_point, 0])
+    assert np.nanquantile(distance, 0.99) < 0.12
     kept = refined(raw, PUBLISHED).vertex_of_point  # where nothing is centred every point keeps its vertex
     np.testing.assert_array_equal(kept, vertex)
 
@@ -112,23 +112,23 @@ def test_random_graphs_become_sound_skeletons(assert_sound, m, edges, seed):
 @pytest.mark.parametrize(("cut", "bridged", "asked"), [(0, 0, [1]), (0, 1, [1, 2]), (1, 1, [1, 1])])
 def test_loops_are_asked_about_again_if_bridges_made_some(monkeypatch, cut, bridged, asked):
     """A handle is not judged twice; one that was cut open does not stand for another that was bridged."""
-    found, gone = [], []
+    results, cut_edges = [], []
 
     def answer(question, curve, surface, least):
         about, edges = question.about, curve.edges
         if about == "loop":
-            found.append(curve.n_loops)
+            results.append(curve.n_loops)
         elif about == "air" and cut:
-            gone.append(edges[len(edges) // 2])  # of the ring, which may have a spur
+            cut_edges.append(edges[len(edges) // 2])  # of the ring, which may have a spur
             edges = np.delete(edges, len(edges) // 2, axis=0)
         elif about == "gap" and bridged:
-            edges = np.vstack([edges, gone or [np.sort([edges[0, 0], edges[len(edges) // 2, 1]])]])
+            edges = np.vstack([edges, cut_edges or [np.sort([edges[0, 0], edges[len(edges) // 2, 1]])]])
         changed = len(edges) != len(curve.edges)
         return curve.rewired(edges), [glsk.Decision(about, (0, 0, 0), 1.0, changed)]
 
     monkeypatch.setattr(refiner, "ask", answer)
     glsk.Refiner(spacing=0)(glsk.Pipeline(*pipelines.default().stages[:-2])(samples.torus(1000).points))
-    assert found == asked
+    assert results == asked
 
 
 def test_limbs_without_a_cloud_stay():
@@ -146,12 +146,12 @@ def test_points_that_do_not_show_the_surface_do_not_count_and_belong_to_the_near
     assert len(rest) > 1000
     points = raw.points.copy()
     points[rest] += 0.01
-    found, other = glsk.Refiner()(raw), glsk.Refiner()(replace(raw, points=points))
+    skeleton, other = glsk.Refiner()(raw), glsk.Refiner()(replace(raw, points=points))
     for name in ("vertices", "edges", "radii"):
-        np.testing.assert_array_equal(getattr(found, name), getattr(other, name))
+        np.testing.assert_array_equal(getattr(skeleton, name), getattr(other, name))
     nearest = shown[cKDTree(raw.points[shown]).query(raw.points[rest])[1]]
-    np.testing.assert_array_equal(found.vertex_of_point[rest], found.vertex_of_point[nearest])
-    np.testing.assert_array_equal(found.normals, raw.normals)
+    np.testing.assert_array_equal(skeleton.vertex_of_point[rest], skeleton.vertex_of_point[nearest])
+    np.testing.assert_array_equal(skeleton.normals, raw.normals)
 
 
 def test_points_outside_a_sample_have_the_vertex_of_their_representative():

@@ -42,8 +42,8 @@ def test_the_nearest_pairs_are_merged_first():
 
 def evened(points, around):
     neighbours = nearest_neighbours(points, 16)[1]
-    apart = spacing_enough(points, neighbours, principal(points, neighbours)[0], around)
-    return thin_nearer(points, neighbours, apart), apart
+    spacing = spacing_enough(points, neighbours, principal(points, neighbours)[0], around)
+    return thin_nearer(points, neighbours, spacing), spacing
 
 
 @pytest.mark.parametrize("noise", [0, 0.2])

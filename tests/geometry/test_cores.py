@@ -45,10 +45,10 @@ def test_threads_give_results_in_order_and_take_few_items_ahead(n, monkeypatch):
 @pytest.mark.parametrize("n", [1, 3])
 def test_an_error_in_a_thread_is_raised(n, monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", str(n))
-    found = in_threads(lambda number: 6 // number, [3, 0, 1])
-    assert next(found) == 2
+    results = in_threads(lambda number: 6 // number, [3, 0, 1])
+    assert next(results) == 2
     with pytest.raises(ZeroDivisionError):
-        next(found)
+        next(results)
 
 
 def test_an_interpreter_that_ends_goes_on_without_threads():
@@ -72,10 +72,10 @@ def test_a_caller_that_stops_early_does_not_wait_for_tasks_that_have_not_begun(n
             go_on.wait(10)
         return number
 
-    found = in_threads(wait, range(20), 2)
-    assert next(found) == 0
+    results = in_threads(wait, range(20), 2)
+    assert next(results) == 0
     go_on.set()
-    found.close()
+    results.close()
     assert len(begun) <= 4
 
 

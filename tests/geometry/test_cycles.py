@@ -60,8 +60,8 @@ def test_edges_on_no_cycle_are_the_bridges_of_networkx(n, density, seed):
     graph = nx.gnp_random_graph(n, density, seed=seed)
     bridges = {tuple(sorted(edge)) for edge in nx.bridges(graph)}
     edges = np.array(sorted(map(sorted, graph.edges)), int).reshape(-1, 2)
-    found = edges_on_cycles(n, edges)
-    assert {tuple(edge) for edge in edges[~found].tolist()} == bridges
+    actual = edges_on_cycles(n, edges)
+    assert {tuple(edge) for edge in edges[~actual].tolist()} == bridges
 
 
 # ---- the circle inside
@@ -84,8 +84,8 @@ def test_the_inscribed_circle_of_a_shape_is_known(name, size):
     flat, radius, at = SHAPES[name]
     points = np.column_stack([flat, 0 * flat[:, 0]]) @ TURN * size + 5 * size
     middle = np.array([*at, 0]) @ TURN * size + 5 * size
-    centre, found = inscribed_circle(points)
-    assert found == pytest.approx(radius * size, rel=0.015)
+    centre, actual = inscribed_circle(points)
+    assert actual == pytest.approx(radius * size, rel=0.015)
     assert np.linalg.norm(centre - middle) < (0.15 if name == "ellipse" else 0.03) * radius * size
 
 

@@ -21,15 +21,15 @@ def test_a_wave_on_a_plane_shrinks_by_its_eigenvalue(length, wave):
     """(I - l^2 Laplacian)^-1 divides cos(k x) by 1 + l^2 k^2."""
     k = 2 * np.pi / wave
     inside = (np.abs(GRID[:, :2] - 29.5) < 29.5 - 4 * length).all(axis=1)
-    found = diffused(GRID, np.cos(k * GRID[:, :1]), length)[inside, 0]
+    actual = diffused(GRID, np.cos(k * GRID[:, :1]), length)[inside, 0]
     wanted = np.cos(k * GRID[inside, 0]) / (1 + (length * k) ** 2)
-    np.testing.assert_allclose(found, wanted, atol=0.08)
+    np.testing.assert_allclose(actual, wanted, atol=0.08)
 
 
 def test_diffusion_does_not_depend_on_scale_and_offset():
     values = RNG.normal(size=(len(GRID), 3))
-    here = diffused(GRID, values, 2)
-    np.testing.assert_allclose(diffused(1e3 * GRID + 1e6, values + 1e6, 2e3) - 1e6, here, atol=1e-6)
+    expected = diffused(GRID, values, 2)
+    np.testing.assert_allclose(diffused(1e3 * GRID + 1e6, values + 1e6, 2e3) - 1e6, expected, atol=1e-6)
 
 
 @pytest.mark.parametrize("points", [np.zeros((1, 3)), np.zeros((20, 3)), np.repeat(GRID[:4], 9, axis=0)])

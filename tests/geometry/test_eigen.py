@@ -26,9 +26,9 @@ def test_eigenvalues_and_directions_are_the_known_ones(spread, scale):
     made = entries(made)
     values, least = principal_parts(made)
     # where two are the same the closed form is good to the root of rounding
-    for found, known, others in zip(values, spread, ((1,), (0, 2), (1,)), strict=True):
+    for actual, known, others in zip(values, spread, ((1,), (0, 2), (1,)), strict=True):
         alone = min(abs(known - spread[other]) for other in others) > 1e-3
-        np.testing.assert_allclose(found, scale * known, rtol=1e-12, atol=scale * (1e-14 if alone else 3e-8))
+        np.testing.assert_allclose(actual, scale * known, rtol=1e-12, atol=scale * (1e-14 if alone else 3e-8))
     np.testing.assert_array_equal(values[2], largest_eigenvalue(made))
     for directions, column, beside in ((least, 0, 1), (main_direction(made), 2, 1)):
         np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1, rtol=1e-12)

@@ -32,8 +32,8 @@ def clouds():
 @pytest.mark.parametrize("points", [pytest.param(points, id=name) for name, points in clouds()])
 def test_the_sample_of_blocks_is_that_of_the_whole(points, rows):
     kept, _, weight = sample_grid(points, 2500)
-    found, counts = sample_blocks(in_blocks(points, rows), lambda n: 2500)
-    np.testing.assert_array_equal(found, points[kept])
+    actual, counts = sample_blocks(in_blocks(points, rows), lambda n: 2500)
+    np.testing.assert_array_equal(actual, points[kept])
     np.testing.assert_array_equal(counts, weight)
 
 
@@ -56,8 +56,8 @@ def test_a_sample_does_not_depend_on_threads_and_chunks(chunk, threads, monkeypa
     known = sample_grid(points, 500), sample_blocks(in_blocks(points, 2500), lambda _: 500)
     monkeypatch.setattr(grid_sampling, "GRID_CHUNK", chunk)
     monkeypatch.setenv("OMP_NUM_THREADS", str(threads))
-    found = sample_grid(points, 500), sample_blocks(in_blocks(points, 2500), lambda _: 500)
-    for one, other in zip(known[0] + known[1], found[0] + found[1], strict=True):
+    actual = sample_grid(points, 500), sample_blocks(in_blocks(points, 2500), lambda _: 500)
+    for one, other in zip(known[0] + known[1], actual[0] + actual[1], strict=True):
         np.testing.assert_array_equal(one, other)
 
 

@@ -16,11 +16,11 @@ CLOUDS = {
 
 
 def defined(points, neighbours, most, least):
-    """Round by round, all pairs of points left that are the first left among each other's neighbours."""
+    """Round by round, all pairs of free points that are the first free ones among each other's neighbours."""
     mass, into = np.ones(len(points)), np.arange(len(points))
     while (mass > 0).sum() > least:
-        left = (mass > 0) & (mass + 1 <= most)
-        first = [next((q for q in row[1:] if left[q]), -1) if left[p] else -1 for p, row in enumerate(neighbours)]
+        free = (mass > 0) & (mass + 1 <= most)
+        first = [next((q for q in row[1:] if free[q]), -1) if free[p] else -1 for p, row in enumerate(neighbours)]
         pairs = [(p, q) for p, q in enumerate(first) if p < q and first[q] == p]
         if not pairs:
             break

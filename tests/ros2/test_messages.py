@@ -59,9 +59,9 @@ def test_points_are_read_from_any_layout(packed, sent, make_message, fields, ste
     points[4] = np.nan
     points[7, 1] = np.inf
     cloud = packed(points, fields, step, height=height, padding=padding, big=big)
-    found = points_of(sent(cloud, CLOUD))
-    assert found.dtype == np.float64
-    np.testing.assert_array_equal(found, points)
+    actual = points_of(sent(cloud, CLOUD))
+    assert actual.dtype == np.float64
+    np.testing.assert_array_equal(actual, points)
     for data in (cloud.data.tobytes(), bytearray(cloud.data)):  # as rclpy and others have it
         np.testing.assert_array_equal(points_of(replace(cloud, data=data)), points)
     assert points_of(packed(np.empty((0, 3)), PLAIN, 12)).shape == (0, 3)
@@ -93,14 +93,14 @@ def test_markers_show_edges_vertices_and_junctions(skeleton, make_message, heade
     assert (first.action, first.ns, first.points) == (3, "", [])  # without a namespace it deletes all
     assert all(marker.header == header and marker.action == 0 for marker in shown)
     assert all((marker.pose.orientation.w, marker.pose.position.x) == (1, 0) for marker in markers)
-    found = {marker.ns: rows(marker.points) for marker in shown}
+    actual = {marker.ns: rows(marker.points) for marker in shown}
     expected = {
         "edges": skeleton.vertices[skeleton.edges].reshape(-1, 3),
         "vertices": skeleton.vertices[skeleton.degree < 3],
         "junctions": skeleton.vertices[skeleton.junctions],
     }
-    assert list(found) == [name for name, places in expected.items() if len(places)]
-    for name, places in found.items():
+    assert list(actual) == [name for name, places in expected.items() if len(places)]
+    for name, places in actual.items():
         np.testing.assert_array_equal(places, expected[name])
     assert [marker.type for marker in shown] == [5 if marker.ns == "edges" else 7 for marker in shown]
     for marker in shown:

@@ -168,11 +168,11 @@ def test_the_script_does_what_the_node_does(recorded, types, tmp_path, expected,
     said = capsys.readouterr()
     assert "2 clouds" in said.out
     assert f"cloud at {2 * SECOND}" in said.err
-    found = messages(tmp_path / "out", types)
-    assert [(time, topic) for time, topic, _ in found] == [
+    actual = messages(tmp_path / "out", types)
+    assert [(time, topic) for time, topic, _ in actual] == [
         (time * SECOND, f"/skeletonize_node/{name}") for time in (1, 3) for name in ("markers", "poses")
     ]
-    for (_, _, markers), (_, _, poses) in zip(found[::2], found[1::2], strict=True):
+    for (_, _, markers), (_, _, poses) in zip(actual[::2], actual[1::2], strict=True):
         np.testing.assert_array_equal(line_ends(markers, rows), expected.vertices[expected.edges].reshape(-1, 3))
         np.testing.assert_array_equal(rows(pose.position for pose in poses.poses), expected.vertices)
         assert (poses.header.frame_id, poses.header.stamp.sec) == (header.frame_id, header.stamp.sec)

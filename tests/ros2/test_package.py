@@ -43,18 +43,18 @@ def test_setup_installs_what_ament_looks_for(package, facts, installed):
 
 def test_package_xml_names_all_that_is_imported(package, facts):
     named = {depend.text for depend in facts.findall("exec_depend")}
-    found = set()
+    imported = set()
     for path in package.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Import):
-                found.update(alias.name.split(".")[0] for alias in node.names)
+                imported.update(alias.name.split(".")[0] for alias in node.names)
             elif isinstance(node, ast.ImportFrom) and not node.level:
-                found.add(node.module.split(".")[0])
+                imported.add(node.module.split(".")[0])
             elif isinstance(node, ast.Constant) and "/msg/" in str(node.value) and " " not in node.value:
-                found.add(node.value.split("/")[0])
+                imported.add(node.value.split("/")[0])
     python = {"numpy": "python3-numpy", "scipy": "python3-scipy"}
-    apart = {"glsk_o3d", "rosbags", "setuptools", *sys.stdlib_module_names}
-    assert {python.get(name, name) for name in found - apart} == named
+    elsewhere = {"glsk_o3d", "rosbags", "setuptools", *sys.stdlib_module_names}
+    assert {python.get(name, name) for name in imported - elsewhere} == named
 
 
 def test_the_launch_file_starts_the_node_with_its_parameters(package, ros, installed, monkeypatch):
