@@ -123,8 +123,8 @@ def until():
     def wait(condition, *processes):
         while True:
             ended = [process.args for process in processes if process.poll() is not None]
-            if found := condition():
-                return found
+            if value := condition():
+                return value
             assert not ended, "waited in vain"
             sleep(0.02)
 

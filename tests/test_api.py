@@ -11,7 +11,7 @@ _, KEPT = remove_redundant_points(POINTS)
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_tensor_clouds(dtype):
+def test_a_tensor_cloud_keeps_its_attributes_and_types(dtype):
     cloud = o3d.t.geometry.PointCloud(o3d.core.Tensor(POINTS.astype(dtype)))
     cloud.point.intensity = o3d.core.Tensor(np.arange(1500.0)[:, None])
     reduced, kept = remove_redundant_points(cloud)
@@ -26,7 +26,7 @@ def test_tensor_clouds(dtype):
         np.testing.assert_array_equal(kept.numpy(), KEPT)
 
 
-def test_legacy_clouds_arrays_tensors_and_lists():
+def test_legacy_clouds_arrays_tensors_and_lists_keep_the_same_points():
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(POINTS))
     cloud.colors = o3d.utility.Vector3dVector(np.abs(POINTS))
     reduced, kept = remove_redundant_points(cloud)
@@ -39,7 +39,7 @@ def test_legacy_clouds_arrays_tensors_and_lists():
     assert remove_redundant_points(POINTS.astype(np.float32))[0].dtype == np.float32
 
 
-def test_duplicates_and_outliers():
+def test_duplicates_go_and_outliers_stay():
     twice = np.concatenate([POINTS, POINTS])
     _, kept = remove_redundant_points(twice)
     assert max(kept) < 1500  # the first of each
@@ -48,11 +48,8 @@ def test_duplicates_and_outliers():
 
 
 @pytest.mark.parametrize("passes", [0, 1.0])
-def test_wrong_parameters(passes):
+def test_wrong_passes_are_refused(passes):
     with pytest.raises(InvalidParameterError, match="passes"):
         remove_redundant_points(POINTS, passes=passes)
-
-
-def test_a_mesh_is_no_cloud():
     with pytest.raises(InvalidCloudError):
         remove_redundant_points(o3d.geometry.TriangleMesh.create_sphere())

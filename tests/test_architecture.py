@@ -20,9 +20,6 @@ LONG_FUNCTIONS = {
 """Functions of more than 50 lines of code, and why: at most three."""
 
 
-# ------------------------------------------------------------------------------------------------------------- imports
-
-
 def test_imports_go_down():
     assert architecture.upward() == set()
 
@@ -45,20 +42,6 @@ def test_the_diagram_is_that_of_the_code(tmp_path):
         assert re.findall(part, shown) == re.findall(part, drawn), "make figures"
 
 
-def test_late_imports_count_and_so_do_those_for_type_checkers(tmp_path):
-    package = tmp_path / "glsk_o3d"
-    (package / "b").mkdir(parents=True)
-    (package / "a.py").write_text("class Shape:\n    def draw(self):\n        from .b.c import d\n        return d\n")
-    (package / "b" / "c.py").write_text("from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from . import a\n")
-    (package / "b" / "d.py").write_text("from ..a import Shape\nfrom . import c\n")
-    assert architecture.imports(package) == {
-        ("a", "a.Shape.draw", "b.c"),
-        ("b.c", "b.c", "b"),
-        ("b.d", "b.d", "a"),
-        ("b.d", "b.d", "b.c"),
-    }
-
-
 def test_geometry_knows_arrays_alone():
     for path in (PACKAGE / "geometry").glob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
@@ -66,9 +49,6 @@ def test_geometry_knows_arrays_alone():
                 names = [node.module or ""] if isinstance(node, ast.ImportFrom) else [each.name for each in node.names]
                 assert getattr(node, "level", 0) <= 1 or names == ["errors"], path
                 assert not {name.split(".")[0] for name in names} & {"open3d", "matplotlib", "networkx"}, path
-
-
-# -------------------------------------------------------------------------------------------------------------- lengths
 
 
 def code_lines(path):

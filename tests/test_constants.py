@@ -40,24 +40,6 @@ def test_every_number_says_where_it_comes_from(path):
     assert silent == []
 
 
-@pytest.mark.parametrize(
-    ("source", "origin"),
-    [
-        ("A = 1  # fitted: a share", "fitted"),
-        ("# derived: why\nA = 1", "derived"),
-        ("# All fitted.\nB = 2\nA = 1", "fitted"),
-        ("# All fitted.\nB = 2\nA = 1  # speed: rows", "speed"),
-        ("# All fitted.\n\nA = 1", None),
-        ("B = 2  # fitted\nA = 1", None),
-        ("B = 2\n# measured\nC = 3\nA = 1", None),
-        ("A = 1  # unfitted", None),
-    ],
-)
-def test_which_comments_count(source, origin):
-    (statement,) = (statement for name, statement in steering.constants(ast.parse(source)) if name == "A")
-    assert steering.origin(steering.comments(source.splitlines(), statement)) == origin
-
-
 def test_the_numbers_of_all_steps_are_listed():
     numbers = steering.steering()
     assert {each.name for each in numbers} >= {"amplification", "limb: slenderness", "line_variance", "diffusion"}

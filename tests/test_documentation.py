@@ -201,7 +201,7 @@ def test_the_advice_on_options_can_be_taken():
         assert {*re.findall(r"(\w+)=", words)} <= {field.name for field in dataclasses.fields(BUILTIN[cls])}
 
 
-def test_figures_agree_with_the_tables_that_they_come_from():
+def test_figures_in_the_text_are_those_of_the_tables():
     table = page("evaluation.md").partition("<!-- ablation -->")[2].partition("<!-- end -->")[0]
     default, *rows = re.findall(r"^\| (?:default|without).* \| ([\d.]+ / \d+) \| (.*) \|$", table, re.MULTILINE)
     effects = re.findall(r"(`[^`]+`): ([\d.]+ / \d+) → ([\d.]+ / \d+); \w+:", page("differences.md"))

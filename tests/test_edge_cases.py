@@ -88,7 +88,7 @@ def held_bytes(cloud):
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("case", SOUND)
-def test_sound_clouds(case, name, assert_sound):
+def test_a_sound_cloud_has_a_sound_skeleton(case, name, assert_sound):
     cloud = SOUND[case]
     before = held_bytes(cloud)
     skeleton = run(cloud, name)
@@ -104,7 +104,7 @@ def test_sound_clouds(case, name, assert_sound):
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_refused_clouds(case):
+def test_an_unusable_cloud_is_refused(case):
     cloud, message = REFUSED[case]
     with pytest.raises(InvalidCloudError, match=message):
         run(cloud, "default")
@@ -132,13 +132,13 @@ def test_invalid_points_can_be_dropped(name, assert_sound):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_warns_where_no_curve_skeleton_is_meaningful(name):
+def test_balls_and_sheets_are_warned_of(name):
     for case, kind in (("sphere", "-like"), ("sheet", "sheet-like")):
         assert any(kind in message for message in run(SOUND[case], name).report.warnings)
 
 
 @pytest.mark.parametrize("kind", ["noisy sphere", "solid ball", "surface of a cube"])
-def test_warns_of_what_is_as_thick_as_long(kind):
+def test_objects_as_thick_as_long_are_warned_of(kind):
     rng = np.random.default_rng(0)
     out = rng.normal(size=(1024, 3))
     out /= np.linalg.norm(out, axis=1, keepdims=True)
@@ -157,11 +157,11 @@ def test_copies_count_once(name):
     np.testing.assert_array_equal(doubled.vertex_of_point, np.repeat(single.vertex_of_point, 2))
 
 
-@pytest.mark.parametrize("apart", [1e-15, 1e-11, 1e-8])
-def test_what_is_a_copy_is_said_by_the_spacing(apart):
+@pytest.mark.parametrize("distance", [1e-15, 1e-11, 1e-8])
+def test_copies_are_points_much_nearer_than_the_spacing(distance):
     """Copies moved by much less than the points are apart; and a small object beside a large one is none."""
     rng, cloud = np.random.default_rng(0), samples.sauropod(2500).points
-    moved = [cloud + apart * rng.normal(size=cloud.shape) for _ in range(4)]
+    moved = [cloud + distance * rng.normal(size=cloud.shape) for _ in range(4)]
     several, single = run(np.concatenate([cloud, *moved]), "default"), run(cloud, "default")
     assert several.report.n_distinct == len(cloud)
     assert [several.n_components, several.n_loops, len(several.leaves)] == [1, single.n_loops, len(single.leaves)]

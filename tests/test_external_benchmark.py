@@ -23,8 +23,8 @@ def write_ply(path, points):
 def shape_of(made, name):
     """Components, loops, leaves and junctions of an axis."""
     truth = made.truth(name)
-    found = Skeleton(truth.nodes, truth.edges, truth.radii, (), (), ())
-    return found.n_components, found.n_loops, len(found.leaves), len(found.junctions)
+    skeleton = Skeleton(truth.nodes, truth.edges, truth.radii, (), (), ())
+    return skeleton.n_components, skeleton.n_loops, len(skeleton.leaves), len(skeleton.junctions)
 
 
 @pytest.fixture
@@ -42,18 +42,17 @@ def trees(tmp_path):
 
 def test_branches_of_trees_are_welded_where_they_begin(call, trees, tmp_path):
     assert "1 shapes, 2 clouds" in call("trees", trees, "-o", tmp_path / "bench")
-    made = read_folder(tmp_path / "bench")
-    assert [(cloud.name, cloud.family) for cloud in made.clouds] == [
+    benchmark = read_folder(tmp_path / "bench")
+    assert [(cloud.name, cloud.family) for cloud in benchmark.clouds] == [
         (f"tree_small_7_res{res}", "small") for res in (50, 150)
     ]
-    assert shape_of(made, "tree_small_7") == (1, 0, 4, 1)
-    truth = made.truth("tree_small_7")
+    assert shape_of(benchmark, "tree_small_7") == (1, 0, 4, 1)
+    truth = benchmark.truth("tree_small_7")
     assert (len(truth.nodes), len(truth.edges)) == (5, 4)
     np.testing.assert_allclose(truth.radii, 0.3, rtol=0.05)
     call("trees", trees, "-o", tmp_path / "bench", "--only", "tree_small_*")
-    assert read_folder(tmp_path / "bench") == made
-    wrong = call("trees", trees, "-o", tmp_path / "bench", "--only", "tree_large_*", code=2)
-    assert "none of 1 shapes is called tree_large_*" in wrong
+    assert read_folder(tmp_path / "bench") == benchmark
+    call("trees", trees, "-o", tmp_path / "bench", "--only", "tree_large_*", code=2)
 
 
 @pytest.fixture
@@ -69,18 +68,18 @@ def plants(tmp_path):
     return tmp_path / "data"
 
 
-def test_graphs_of_plants_and_clouds_of_both_kinds(call, plants, tmp_path):
+def test_graphs_of_plants_are_read_with_clouds_of_both_kinds(call, plants, tmp_path):
     out = call("plants", plants, "-o", tmp_path / "bench")
     assert "2 shapes, 2 clouds" in out
     assert "left out" not in out
-    made = read_folder(tmp_path / "bench")
-    assert [(cloud.name, cloud.family) for cloud in made.clouds] == [
+    benchmark = read_folder(tmp_path / "bench")
+    assert [(cloud.name, cloud.family) for cloud in benchmark.clouds] == [
         ("maize-03-13_scan", "maize"),
         ("tomato-03-13_scan", "tomato"),
     ]
-    for name in made.shapes:
-        assert shape_of(made, name) == (1, 0, 3, 1)
-        np.testing.assert_allclose(np.median(made.truth(name).radii), 50 * np.median(FORK.radii), rtol=0.1)
+    for name in benchmark.shapes:
+        assert shape_of(benchmark, name) == (1, 0, 3, 1)
+        np.testing.assert_allclose(np.median(benchmark.truth(name).radii), 50 * np.median(FORK.radii), rtol=0.1)
 
 
 def test_a_bad_graph_is_named(call, plants, tmp_path):
@@ -102,14 +101,14 @@ def test_clouds_of_vessels_are_drawn_of_the_round_cones(call, vessels, tmp_path)
     words = ("vessels", vessels, "-o", tmp_path / "bench", "--variants", "clean,noise1", "--points", 1000)
     assert "1 shapes, 2 clouds" in call(*words)
     assert "left out" not in call(*words)  # the same again
-    made = read_folder(tmp_path / "bench")
-    (name,) = made.shapes
+    benchmark = read_folder(tmp_path / "bench")
+    (name,) = benchmark.shapes
     assert name == "some-one-a.CNG"
-    assert shape_of(made, name) == (1, 0, 3, 1)
-    truth = made.truth(name)
+    assert shape_of(benchmark, name) == (1, 0, 3, 1)
+    truth = benchmark.truth(name)
     low, high = truth.nodes - truth.radii[:, None], truth.nodes + truth.radii[:, None]
     assert np.linalg.norm(high.max(axis=0) - low.min(axis=0)) == pytest.approx(1)
-    points = np.asarray(o3d.io.read_point_cloud(str(made.clouds[0].path)).points)
+    points = np.asarray(o3d.io.read_point_cloud(str(benchmark.clouds[0].path)).points)
     assert len(points) == 1000
     assert np.abs(samples.signed_distance(points, truth.nodes, truth.edges, truth.radii)).max() < 1e-4
 

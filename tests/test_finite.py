@@ -79,11 +79,11 @@ def watched(monkeypatch):
 
     def looked_at(name, step):
         def look(*given, **options):
-            made = step(*given, **options)
-            skeleton, decisions = made if isinstance(made, tuple) else (made, [])
+            result = step(*given, **options)
+            skeleton, decisions = result if isinstance(result, tuple) else (result, [])
             check_finite(skeleton, name)
             assert np.isfinite([(each.probability, *each.place) for each in decisions]).all(), name
-            return made
+            return result
 
         return look
 

@@ -67,7 +67,7 @@ def canonical(row, closed):
     return min(ways), closed
 
 
-def test_normalised_and_nearest_neighbours(golden):
+def test_normalised_points_and_neighbours_are_the_recorded_ones(golden):
     np.testing.assert_allclose(golden.built.cloud[golden.row], golden.recorded.normalised, atol=1e-15, rtol=0)
     np.testing.assert_array_equal(np.sort(golden.row), np.arange(len(golden.row)))
     k = published_k(len(golden.row))
@@ -76,7 +76,7 @@ def test_normalised_and_nearest_neighbours(golden):
     np.testing.assert_array_equal(np.sort(golden.point[neighbours[golden.row]]), np.sort(golden.recorded.knn))
 
 
-def test_rings(golden):
+def test_rings_are_the_recorded_ones(golden):
     recorded = as_recorded(golden.recorded.ring_indptr, golden.recorded.ring_indices)
     built = as_built(golden.built.rings, golden.point)
     differ = [i for i, ring in enumerate(recorded) if canonical(*ring) != canonical(*built[golden.row[i]])]
@@ -90,7 +90,7 @@ def recorded_rings(recorded):
     return Rings(indptr, np.concatenate([row for row, _ in lists]), np.array([closed for _, closed in lists]))
 
 
-def test_laplacian(golden):
+def test_the_laplacian_is_the_recorded_one(golden):
     z = golden.recorded
     expected = csr_matrix((z.laplacian_val, (z.laplacian_row, z.laplacian_col)), shape=2 * z.points.shape[:1])
     on_theirs = cotangent_laplacian(z.normalised, recorded_rings(z))
@@ -103,7 +103,7 @@ def test_laplacian(golden):
         assert (np.asarray(difference.sum(axis=1)).ravel() < 1e-9 * rows).all()
 
 
-def test_first_contraction_weight(golden):
+def test_the_first_contraction_weight_is_the_recorded_one(golden):
     """The published code averages a closed ring with its first entry counted twice; we count every neighbour once."""
     z = golden.recorded
     owner = np.repeat(np.arange(len(z.points)), np.diff(z.ring_indptr))
@@ -118,7 +118,7 @@ def test_first_contraction_weight(golden):
     assert 0.01 < 1 - ratio < 0.02
 
 
-def test_first_solve_and_its_ring_sizes(golden):
+def test_the_first_solve_and_its_ring_sizes_are_the_recorded_ones(golden):
     z, solved = golden.recorded, golden.solved
     assert solved.contraction_weight == pytest.approx(float(z.w_L0), rel=1e-14)
     np.testing.assert_allclose(solved.positions[golden.row], z.solve1, atol=1e-8, rtol=0)
@@ -128,7 +128,7 @@ def test_first_solve_and_its_ring_sizes(golden):
     np.testing.assert_array_equal(nearest[golden.row], z.ring_indices[z.ring_indptr[:-1] + z.nearest_in_ring])
 
 
-def test_merge_energy(golden):
+def test_merge_energies_are_the_recorded_ones(golden):
     """Without the curvature term, where the published code takes the first point's Laplacian coordinate for all."""
     solved = golden.solved
     delta = solved.laplacian_coordinates
@@ -142,7 +142,7 @@ def test_merge_energy(golden):
     np.testing.assert_allclose(ours[golden.row][alike], golden.recorded.F_without_U[alike], rtol=1e-6)
 
 
-def test_first_pass_keeps_the_same_points_and_merges_the_same_pairs(golden):
+def test_the_first_pass_keeps_and_merges_the_recorded_points(golden):
     z, reduced = golden.recorded, golden.reduced
     kept = np.zeros(len(z.points), bool)
     kept[reduced.map.point_of_survivor] = True
@@ -152,7 +152,7 @@ def test_first_pass_keeps_the_same_points_and_merges_the_same_pairs(golden):
     np.testing.assert_array_equal(reduced.map.point_of_survivor[reduced.survivor_of_point], expected)
 
 
-def test_rings_after_the_first_pass(golden):
+def test_rings_after_the_first_pass_are_the_recorded_ones(golden):
     z, reduced = golden.recorded, golden.reduced
     name = np.flatnonzero(z.keep1)  # their indices count the survivors
     recorded = [(name[k].tolist(), closed) for k, closed in as_recorded(z.ring_after1_indptr, z.ring_after1_indices)]
@@ -172,7 +172,7 @@ def test_runs_agree_until_they_part(golden):
     np.testing.assert_allclose(survivors, z.n_per_iteration[:3], rtol=0.01)
 
 
-def test_cao(golden):
+def test_the_baseline_contracts_as_recorded(golden):
     """The published code computes the last solve, tests it and throws it away; so does its pipeline here."""
     ratios = [record.ring_ratio for record in golden.cao.report.iterations]
     np.testing.assert_allclose(ratios, golden.recorded.cao_a_per_iteration, atol=1e-4, rtol=0)

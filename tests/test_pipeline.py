@@ -69,7 +69,7 @@ def flow():
         if not (cls.consumes is kind or (kind is Cloud and cls.takes_clouds()))
     ],
 )
-def test_what_belongs_elsewhere_is_refused(cls, given, flow):
+def test_a_filter_refuses_what_another_one_takes(cls, given, flow):
     with pytest.raises(StageError, match=cls.__name__):
         cls()(flow[given])
 
@@ -82,10 +82,10 @@ def test_a_pipeline_is_its_filters_called_in_turn(name):
         by_hand = stage(by_hand)
     assert_same(pipeline(POINTS), by_hand)
     assert_same(skeletonize(POINTS.copy(), name), by_hand)  # the same to the last bit
-    told = []
-    skeleton = skeletonize(POINTS, pipeline, on_iteration=told.append)
+    records = []
+    skeleton = skeletonize(POINTS, pipeline, on_iteration=records.append)
     assert_same(skeleton, by_hand)
-    assert tuple(told) == skeleton.report.iterations
+    assert tuple(records) == skeleton.report.iterations
     if name == "default":
         assert_same(skeletonize(POINTS), by_hand)
     report = by_hand.report
@@ -93,7 +93,7 @@ def test_a_pipeline_is_its_filters_called_in_turn(name):
     assert set(report.seconds) >= {type(stage).__name__ for stage in pipeline.stages}
 
 
-def test_bars_associate():
+def test_bars_between_filters_associate():
     a, b, c, d = RingBuilder(), Contractor(), Connector(), Refiner()
     pipeline = a | b | c | d
     assert isinstance(pipeline, Pipeline)
@@ -148,7 +148,7 @@ def test_options_by_full_and_by_short_name():
 
 
 @pytest.mark.parametrize("order", [1, -1])
-def test_what_is_put_in_may_be_varied_too(order):
+def test_options_of_a_part_may_be_set_with_the_part(order):
     options = [("RingSizeRatio.threshold", 0.5), ("stop", RingSizeRatio()), ("phi", 7.0), ("reducer", LPRReducer())]
     contractor = pipelines.cao2010().with_options(dict(options[::order])).stages[2]
     assert contractor.stop == RingSizeRatio(0.5)
@@ -172,14 +172,14 @@ def test_what_is_put_in_may_be_varied_too(order):
         ({}, {"stop": "never"}, r"Contractor\.stop"),
     ],
 )
-def test_options_that_are_none_or_wrong_or_given_twice(options, named, words):
+def test_unknown_wrong_and_doubled_options_are_refused(options, named, words):
     with pytest.raises(InvalidParameterError, match=words):
         pipelines.default().with_options(options, **named)
     with pytest.raises(InvalidParameterError, match=words):
         skeletonize(np.zeros((0, 3)), options, **named)
 
 
-def test_unknown_names_tell_the_nearest_or_list_the_known_ones_and_incomplete_pipelines_are_refused():
+def test_unknown_and_incomplete_pipelines_are_refused():
     known = (("cao2011", "'cao2010'"), ("best", "wen2024, cao2010"), (RingBuilder() | Contractor(), "from a cloud"))
     for wrong, words in known:
         with pytest.raises(InvalidParameterError, match=words):
@@ -190,19 +190,19 @@ def test_unknown_names_tell_the_nearest_or_list_the_known_ones_and_incomplete_pi
     ("shape", "components", "loops", "leaves"),
     [("tube", 1, 0, 2), ("torus", 1, 1, 0), ("helix", 1, 0, 2), ("y_junction", 1, 0, 3), ("two_rings", 2, 2, 0)],
 )
-def test_default_on_shapes_with_a_known_axis(shape, components, loops, leaves):
+def test_the_default_finds_the_axis_of_known_shapes(shape, components, loops, leaves):
     sample = samples.SAMPLES[shape](n=2048)
     skeleton = skeletonize(sample.points)
     assert (skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)) == (components, loops, leaves)
-    found = compare(skeleton, sample)
-    assert found.error < 0.1
-    assert found.inside == found.completeness == 1
+    measures = compare(skeleton, sample)
+    assert measures.error < 0.1
+    assert measures.inside == measures.completeness == 1
     assert np.median(skeleton.radii) == pytest.approx(sample.radii.mean(), rel=0.1)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["cao2010", "default"])
-def test_moves_and_scales_along_with_the_cloud(name):
+def test_a_skeleton_moves_and_scales_with_its_cloud(name):
     """Measured: vertices agree to 1e-7 tube radii, from roundings of 1e-16 that ill-conditioned late solves blow up."""
     shape = np.round(samples.y_junction(n=700).points * 2**20) / 2**20  # so that the shift costs them 1e-10
     still, turn = skeletonize(shape, name), np.eye(3)[[1, 2, 0]]
@@ -216,7 +216,7 @@ def test_moves_and_scales_along_with_the_cloud(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["tube", "torus", "y_junction", "two_rings"])
-def test_any_rotation_of_the_points_in_any_order(name):
+def test_a_skeleton_turns_with_its_cloud_in_any_order(name):
     """The same skeleton turned back, but for rounding.
 
     The published pipelines do not promise it: a turn changes the bounding box, and with it the weights.
@@ -227,8 +227,8 @@ def test_any_rotation_of_the_points_in_any_order(name):
     still, turned = skeletonize(points), skeletonize(points[order] @ turn)
     size = 1e-6 * np.ptp(points, axis=0).max()
     assert len(turned.vertices) == len(still.vertices)
-    apart, place = cKDTree(still.vertices).query(turned.vertices @ turn.T)
-    assert apart.max() < size
+    distance, place = cKDTree(still.vertices).query(turned.vertices @ turn.T)
+    assert distance.max() < size
     assert sorted(place) == list(range(len(still.vertices)))
     edges = np.sort(place[turned.edges], axis=1)
     np.testing.assert_array_equal(edges[np.lexsort(edges.T[::-1])], still.edges)
@@ -238,13 +238,13 @@ def test_any_rotation_of_the_points_in_any_order(name):
 
 
 @pytest.mark.parametrize("answer", [False, np.False_, 0])
-def test_what_stops_a_contraction(answer):
+def test_a_caller_may_stop_a_contraction(answer):
     stopped = skeletonize(POINTS, on_iteration=lambda record: answer if record.iteration == 2 else None)
     assert len(stopped.report.iterations) == 2
     assert stopped.report.stop_reason == "stopped by the caller"
 
 
-def test_what_a_caller_does_to_a_state_does_not_change_the_run():
+def test_a_caller_that_changes_a_state_does_not_change_the_run():
     def spoil(state):
         for array in (state.positions, state.previous, state.cloud, state.points, state.mass, state.rings.indices):
             array[:] = 0

@@ -10,7 +10,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::glsk_o3d.Ske
 
 
 @pytest.mark.parametrize("name", ["y_junction", "two_rings", "sauropod"])
-def test_points_that_move_by_next_to_nothing_have_the_same_topology(name):
+def test_a_topology_stays_where_points_move_by_roundings(name):
     points = getattr(samples, name)(2000).points
     size = 1e-7 * np.linalg.norm(np.ptp(points, axis=0))
     still, moved = (

@@ -9,6 +9,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from glsk_o3d import Refiner, Skeleton, SkeletonWarning
+from glsk_o3d.curve.curve import Curve
+from glsk_o3d.curve.surface import Evidence, Surface
 
 NOTHING = dict(handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)
 
@@ -121,3 +123,37 @@ def piped():
         return Skeleton(vertices, sorted(edges), np.full(len(vertices), radius), owner, points, normals)
 
     return make
+
+
+@pytest.fixture(scope="session")
+def strands(piped):
+    """A tube with two strands in it that meet at both ends."""
+
+    def make(gap, length, **options):
+        a, b = length / 2, length / 2 - 0.05
+        middle = [[(-a, 0, 0), (-b, y, 0), (b, y, 0), (a, 0, 0)] for y in (-gap / 2, gap / 2)]
+        ends = [[(-1, 0, 0), (-a, 0, 0)], [(a, 0, 0), (1, 0, 0)]]
+        return piped([*middle, *ends], around=[[(-1, 0, 0), (1, 0, 0)]], **options)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def evidence():
+    """What the surface of a skeleton says about its curve."""
+
+    def of(skeleton):
+        curve = Curve.of(skeleton)
+        return Evidence(curve, Surface.of(curve).oriented(curve))
+
+    return of
+
+
+@pytest.fixture(scope="session")
+def assert_unchanged():
+    def check(skeleton, raw):
+        np.testing.assert_allclose(skeleton.vertices, raw.vertices, atol=1e-12)
+        np.testing.assert_array_equal(skeleton.edges, raw.edges)
+        np.testing.assert_array_equal(skeleton.vertex_of_point, raw.vertex_of_point)
+
+    return check

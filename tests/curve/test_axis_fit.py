@@ -119,7 +119,7 @@ def test_the_curve_of_a_flat_bar_is_its_midline():
 
 
 @pytest.mark.parametrize("thick", [0.15, 0.06, 0.025])
-def test_the_sides_say_where_the_middle_is_if_half_of_the_faces_belongs_to_another_bar(thick):
+def test_the_sides_of_a_bar_centre_its_curve_if_half_of_its_faces_belongs_to_another_bar(thick):
     bar = strip(thick=thick)
     own = (np.abs(bar.points[:, 1]) > 0.29) | (bar.points[:, 1] < 0)
     half = path(bar.vertices, bar.points[own], bar.normals[own])
@@ -128,7 +128,7 @@ def test_the_sides_say_where_the_middle_is_if_half_of_the_faces_belongs_to_anoth
 
 
 @pytest.mark.parametrize(("noise", "known"), [(0.3, False), (1.0, False), (1.0, True)])
-def test_where_noise_is_the_curve_is_smooth_and_near_the_axis(noise, known):
+def test_the_curve_of_noise_is_smooth_and_near_the_axis(noise, known):
     """The noise is up to a radius wide, and its normals may point anywhere."""
     rng, given = np.random.default_rng(0), tube(m=60, around=20, along=150)
     points, normals = given.points + noise * R * rng.normal(size=given.points.shape), given.normals
@@ -169,7 +169,7 @@ def test_a_bar_has_two_sides_and_a_sheet_one(case, low, high):
         assert sure > 0.5 + np.median(fit_axis(bar, 2)[1])
 
 
-def test_points_without_a_normal_or_a_vertex_have_no_say():
+def test_points_without_a_normal_or_a_vertex_do_not_count():
     raw, rest = torus(), slice(700, None)
     normals, vertex, points = raw.normals.copy(), raw.vertex_of_point.copy(), raw.points.copy()
     normals[:400], vertex[400:700] = np.nan, -1

@@ -49,7 +49,7 @@ def others(thing):
 
 
 @pytest.mark.parametrize("what", ["curve", "skeleton", "surface"])
-def test_what_is_kept_of_a_changed_curve_is_what_would_be_computed(raw, what):
+def test_a_changed_curve_keeps_only_what_would_be_computed_again(raw, what):
     raw = replace(raw, vertex_of_point=np.where(raw.vertex_of_point < 9, -1, raw.vertex_of_point))  # some own none
     given = {"curve": Curve.of, "skeleton": lambda it: it, "surface": lambda it: oriented(Curve.of(it))}[what](raw)
     derived, kept = derived_of(type(given)), set()
@@ -78,8 +78,8 @@ def test_a_rewired_curve_has_its_edges_in_order_and_forgets_what_it_does_not_kno
     shuffled = np.random.default_rng(0).permutation(curve.edges)[:, ::-1]
     np.testing.assert_array_equal(curve.rewired(shuffled).edges, raw.edges)
     doubled = np.repeat(raw.vertices, 2, axis=0)
-    found = curve.rewired(2 * shuffled, vertices=doubled, radii=np.ones(2 * m), vertex_of_point=2 * raw.vertex_of_point)
-    skeleton = found.to_skeleton()
+    changes = dict(vertices=doubled, radii=np.ones(2 * m), vertex_of_point=2 * raw.vertex_of_point)
+    skeleton = curve.rewired(2 * shuffled, **changes).to_skeleton()
     assert np.isnan(skeleton.confidence).all()
     assert np.isnan(skeleton.support).all()
     np.testing.assert_array_equal(skeleton.half_width, 1)
@@ -105,10 +105,10 @@ def test_points_without_a_vertex_or_a_normal_keep_none_and_the_others_have_one(r
     owner[::50], normals[1::50] = -1, np.nan
     for representative in (raw.representative_of_point, None):
         given = replace(raw, vertex_of_point=owner, normals=normals, representative_of_point=representative)
-        found = Refiner(**options)(given)
-        np.testing.assert_array_equal(found.vertex_of_point < 0, owner < 0)
-        assert np.isnan(found.normals[1::50]).all()
-        assert (found.n_components, len(found.leaves)) == (1, 3)
+        skeleton = Refiner(**options)(given)
+        np.testing.assert_array_equal(skeleton.vertex_of_point < 0, owner < 0)
+        assert np.isnan(skeleton.normals[1::50]).all()
+        assert (skeleton.n_components, len(skeleton.leaves)) == (1, 3)
     blind = Refiner(**options)(replace(raw, normals=None, representative_of_point=None))
     assert (blind.vertex_of_point >= 0).all()
     assert blind.n_components == 1

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glsk_o3d import Refiner, Skeleton, Tracer, samples, skeletonize
+from glsk_o3d import Refiner, Skeleton, samples, skeletonize
 from glsk_o3d.curve.curve import Curve
 from glsk_o3d.curve.thin.deferred import Deferred
 
@@ -33,7 +33,7 @@ def test_a_crown_is_set_aside_and_the_trunk_is_not(crown):
     assert 60 < len(refined.leaves) < 75  # 65 of the tree
 
 
-def test_it_comes_back_as_it_was(crown):
+def test_a_crown_comes_back_as_it_was(crown):
     _, aside = crown
     whole, rest = aside.whole, aside.rest()
     back = aside.put_back(rest)
@@ -67,7 +67,7 @@ def grid(n):
     return Skeleton(vertices, edges, zeros + 0.1, vertex, points, normals, confidence=zeros)
 
 
-def test_what_is_small_or_mostly_on_loops_is_not_set_aside():
+def test_small_crowns_and_loops_are_not_set_aside():
     net = grid(24)
     assert Deferred.of(Curve.of(net), 0.65) is None
     assert Deferred.of(Curve.of(comb(12)), 0.65) is None
@@ -83,33 +83,24 @@ def comb(n=24, more=()):
 
 def seen(monkeypatch):
     """What is set aside from now on."""
-    found, look = [], Deferred.of
+    results, look = [], Deferred.of
 
     def watch(*args):
-        found.append(look(*args))
-        return found[-1]
+        results.append(look(*args))
+        return results[-1]
 
     monkeypatch.setattr(Deferred, "of", watch)
-    return found
+    return results
 
 
-def test_nothing_may_be_left(monkeypatch):
-    lines, found = comb(), seen(monkeypatch)
-    refined = Refiner(recentre=0)(lines)
-    assert found[0].gone.all()
-    np.testing.assert_array_equal(refined.edges, lines.edges)
-    np.testing.assert_array_equal(refined.vertices, lines.vertices)
-    assert Tracer()(refined).report.n_traced == len(lines.points)
-
-
-def test_points_without_a_vertex_have_none_afterwards():
+def test_points_without_a_vertex_stay_without_one():
     lines = comb()
     owner = np.where(np.arange(len(lines.points)) % 7, lines.vertex_of_point, -1)
     aside = Deferred.of(Curve.of(replace(lines, vertex_of_point=owner)), 0.65)
     np.testing.assert_array_equal(aside.put_back(aside.rest()).vertex_of_point, owner)
 
 
-def test_a_loop_is_opened_unless_all_are_to_be_kept_and_all_can_be_judged(monkeypatch):
+def test_a_loop_of_a_crown_is_opened_unless_all_loops_are_kept(monkeypatch):
     lines = comb(more=[(5 * 24 + 20, 6 * 24 + 20)])
     assert lines.n_loops == 1
     assert Refiner(recentre=0)(lines).n_loops == 0

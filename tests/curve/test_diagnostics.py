@@ -65,13 +65,13 @@ def skeleton_of(*shapes, size=1.0, joined=True, report=None):
     ],
 )
 @pytest.mark.parametrize("size", [1e-3, 1, 1e3])
-def test_shapes(refine, shapes, start, size):
+def test_sheets_balls_and_weak_support_are_warned_of(refine, shapes, start, size):
     messages = refine(skeleton_of(*shapes, size=size)).report.warnings
     assert len(messages) == (start is not None)
     assert not start or messages[0].startswith(start)
 
 
-def test_names_the_region_that_is_weakly_supported(refine):
+def test_a_warning_names_the_region_that_is_weakly_supported(refine):
     (message,) = refine(skeleton_of(torus(400), unsure(600), size=1000)).report.warnings
     reach, place = re.search(r"above all within (\S+) of \((.*?)\)", message).groups()
     assert float(reach) == pytest.approx(1000, rel=0.1)
@@ -86,13 +86,12 @@ CALLS = (
 )
 
 
-def test_names_the_closest_call(refine):
+def test_a_warning_names_the_closest_call(refine):
     judged, clear = (skeleton_of(torus(1600), report=Report(decisions=calls)) for calls in (CALLS, CALLS[2:]))
     assert refine(clear).report.warnings == ()
-    assert refine(judged).report.warnings == (
-        "uncertain topology: 2 of 3 questions about loops, air and gaps were close calls, above all whether the loop "
-        "at (0, 1, 2) is a handle (probability 0.55): look there; if 'loop kept' is wrong, set Refiner.handle=0.56",
-    )
+    (message,) = refine(judged).report.warnings
+    for words in ("2 of 3", "(0, 1, 2)", "0.55", "Refiner.handle=0.56"):
+        assert words in message
 
 
 @pytest.mark.parametrize(

@@ -17,10 +17,10 @@ def webbed(angles):
     """Limbs from the origin whose curves join half-way to where the sharpest corner's tubes part, on the x axis."""
     turned = np.sort(np.mod(angles, 360))
     sharpest = np.diff(turned, append=turned[0] + 360).min()
-    apart = R / np.sin(np.radians(sharpest / 2))
-    meet = np.array([apart / 2, 0, 0])
+    reach = R / np.sin(np.radians(sharpest / 2))
+    meet = np.array([reach / 2, 0, 0])
     struts = [((0, 0, 0), towards(angle)) for angle in angles]
-    return [[meet, towards(angle, apart), towards(angle)] for angle in angles], struts, meet
+    return [[meet, towards(angle, reach), towards(angle)] for angle in angles], struts, meet
 
 
 @pytest.mark.parametrize("half", [20, 45])
@@ -75,8 +75,8 @@ def test_limbs_that_meet_a_trunk_within_a_radius_share_a_junction(refine, quadru
     skeleton = refine(quadruped, recentre=3)
     assert (len(quadruped.junctions), len(skeleton.junctions), len(skeleton.leaves)) == (3, 2, 6)
     assert (skeleton.n_components, skeleton.n_loops) == (1, 0)
-    found = skeleton.vertices[skeleton.junctions]
-    np.testing.assert_allclose(found[np.argsort(found[:, 0])], [[-0.5, 0, 0], [0.5, 0, 0]], atol=0.15 * R)
+    places = skeleton.vertices[skeleton.junctions]
+    np.testing.assert_allclose(places[np.argsort(places[:, 0])], [[-0.5, 0, 0], [0.5, 0, 0]], atol=0.15 * R)
     assert np.isin(skeleton.vertex_of_point, np.arange(len(skeleton.vertices))).all()
     # a symmetric body has a symmetric skeleton
     a, b = skeleton.vertices[skeleton.edges].transpose(1, 0, 2)

@@ -31,30 +31,30 @@ def limb(*twigs, confidence=0.0, n=2000):
 
 def drop(skeleton, root=None):
     """Without spurious twigs, all of no confidence being traced."""
-    left, stays = drop_spurious(skeleton, skeleton.confidence == 0, 1.3, root)
-    np.testing.assert_array_equal(left.vertices, skeleton.vertices[stays])
-    return left
+    kept, stays = drop_spurious(skeleton, skeleton.confidence == 0, 1.3, root)
+    np.testing.assert_array_equal(kept.vertices, skeleton.vertices[stays])
+    return kept
 
 
 @pytest.mark.parametrize(
     ("confidence", "length", "stays"),
     [(0, 1.5, False), (0, 2.4, False), (0, 3.2, True), (0, 20, True), (1, 1.2, False), (1, 1.4, True)],
 )
-def test_a_twig_must_leave_the_scatter_of_its_limb(confidence, length, stays):
+def test_a_twig_stays_if_it_leaves_the_scatter_of_its_limb(confidence, length, stays):
     """Of 2000 points one is expected beyond 2.76 times the root mean square; beside a surface its radius counts."""
-    left = drop(limb((20, length * SCATTER), confidence=confidence))
-    assert len(left.leaves) == (3 if stays else 2)
-    assert len(left.vertices) == (43 if stays else 41)
-    assert (left.vertex_of_point >= 0).all()
+    kept = drop(limb((20, length * SCATTER), confidence=confidence))
+    assert len(kept.leaves) == (3 if stays else 2)
+    assert len(kept.vertices) == (43 if stays else 41)
+    assert (kept.vertex_of_point >= 0).all()
 
 
-def test_many_at_one_fork_go_one_after_another():
-    left = drop(limb((20, SCATTER), (20, -1.5 * SCATTER), (20, 2 * SCATTER), (30, 4 * SCATTER)))
-    assert len(left.leaves) == 3
-    np.testing.assert_array_equal(left.vertices[:41], limb().vertices)
+def test_spurious_twigs_at_one_fork_go_one_after_another():
+    kept = drop(limb((20, SCATTER), (20, -1.5 * SCATTER), (20, 2 * SCATTER), (30, 4 * SCATTER)))
+    assert len(kept.leaves) == 3
+    np.testing.assert_array_equal(kept.vertices[:41], limb().vertices)
 
 
-def test_what_has_a_surface_stays_and_so_does_the_root():
+def test_a_twig_with_a_surface_or_the_root_stays():
     short = limb((20, SCATTER))
     sure = replace(short, confidence=np.ones(43))
     assert drop(sure) is sure

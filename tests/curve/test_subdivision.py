@@ -35,7 +35,7 @@ def test_tiny_radii_make_no_endless_subdivision(refine):
 @pytest.mark.slow
 @settings(max_examples=60)
 @given(st.integers(0, 10**6), st.integers(1, 9), st.floats(0.2, 0.4), st.floats(0.3, 5))
-def test_topology_and_length_stay(random_skeleton, refine, seed, m, reach, spacing):
+def test_subdivision_keeps_topology_and_length(random_skeleton, refine, seed, m, reach, spacing):
     raw = refine(random_skeleton(seed, m, reach, n=200))
     skeleton = refine(raw, spacing=spacing)
     m = len(raw.vertices)

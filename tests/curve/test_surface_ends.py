@@ -53,9 +53,9 @@ def drawn(name, n, noise, seed=0):
     return points + noise * np.linalg.norm(np.ptp(points, axis=0)) * rng.normal(size=points.shape), length, error
 
 
-@pytest.mark.parametrize(("n", "noise"), [(1000, 0), (12000, 0), (4000, 0.005)])
+@pytest.mark.parametrize(("n", "noise"), [(1000, 0), (4000, 0.005)])
 @pytest.mark.parametrize("name", SHAPES)
-def test_the_length_of_an_object(name, n, noise):
+def test_a_curve_to_the_surface_is_as_long_as_its_object(name, n, noise):
     """Noise of half a percent of the diagonal makes a face somewhat round: it is a tenth of the radius of a bar."""
     points, length, error = drawn(name, n, noise)
     skeleton = TO_SURFACE(points)
@@ -65,7 +65,7 @@ def test_the_length_of_an_object(name, n, noise):
     assert noise or skeleton.vertices[:, 2].max() < points[:, 2].max() + 0.1
 
 
-def test_all_but_the_ends_is_as_it_was():
+def test_a_curve_to_the_surface_changes_at_its_ends_alone():
     points = drawn("round bar", 4000, 0.0)[0]
     inside, outside = pipelines.default()(points), TO_SURFACE(points)
     assert inside.length == pytest.approx(19, rel=0.01)

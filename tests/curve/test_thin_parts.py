@@ -35,11 +35,11 @@ def test_a_net_of_wires_keeps_its_loops(around):
     (nodes, edges), radius = net(5), 0.02
     length = np.linalg.norm(nodes[edges[:, 0]] - nodes[edges[:, 1]], axis=1).sum()
     n = round(length * around**2 / (2 * np.pi * radius))
-    found = skeletonize(tubes(nodes, edges, radius, n))
-    assert (found.n_components, found.n_loops) == (1, len(edges) - len(nodes) + 1)
-    assert len(found.leaves) <= 1
-    assert found.length == pytest.approx(length, rel=0.05)
-    assert found.report.n_traced == 0
+    skeleton = skeletonize(tubes(nodes, edges, radius, n))
+    assert (skeleton.n_components, skeleton.n_loops) == (1, len(edges) - len(nodes) + 1)
+    assert len(skeleton.leaves) <= 1
+    assert skeleton.length == pytest.approx(length, rel=0.05)
+    assert skeleton.report.n_traced == 0
 
 
 def clumps(n, several, seed=0):
@@ -54,6 +54,6 @@ def clumps(n, several, seed=0):
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize(("n", "several"), [(300, 3), (300, 4), (1000, 5)])
 def test_a_part_scattered_as_thick_as_it_is_wide_is_no_bundle_of_twigs(n, several, seed):
-    found = skeletonize(clumps(n, several, seed))
-    assert found.report.n_traced == 0
-    assert len(found.leaves) < 10
+    skeleton = skeletonize(clumps(n, several, seed))
+    assert skeleton.report.n_traced == 0
+    assert len(skeleton.leaves) < 10

@@ -9,7 +9,7 @@ from glsk_o3d import Skeleton
 
 
 def slow(skeleton, by_degree):
-    """All prices anew before every merge: members, positions and edges of what is left."""
+    """All prices anew before every merge: members, positions and edges of what remains."""
     position = dict(enumerate(skeleton.vertices))
     support = np.bincount(skeleton.vertex_of_point[skeleton.supporting_points], minlength=len(position))
     weight = dict(enumerate(np.maximum(support, 1.0)))
@@ -40,26 +40,26 @@ def slow(skeleton, by_degree):
 @pytest.mark.slow
 @settings(max_examples=100)
 @given(st.integers(0, 10**6), st.integers(3, 25), st.floats(0.3, 1.2), st.booleans(), st.booleans())
-def test_always_the_cheapest_edge(random_skeleton, refine, seed, m, reach, every, by_degree):
+def test_triangles_collapse_at_the_cheapest_edge(random_skeleton, refine, seed, m, reach, every, by_degree):
     raw = random_skeleton(seed, m, reach, every=every)
     skeleton = refine(raw, collapse="degree" if by_degree else "length")
     members, position, links = slow(raw, by_degree)
     assert len(skeleton.vertices) == len(members)
     assert skeleton.n_components == raw.n_components
     # merged vertices are numbered by any member: find them by place
-    left = sorted(members)
-    at = [int(np.argmin(np.linalg.norm(skeleton.vertices - position[v], axis=1))) for v in left]
-    assert sorted(at) == list(range(len(left)))
-    np.testing.assert_allclose(skeleton.vertices[at], [position[v] for v in left], atol=1e-12)
-    new = dict(zip(left, at, strict=True))
-    edges = {(min(new[a], new[b]), max(new[a], new[b])) for a in left for b in links[a]}
+    remaining = sorted(members)
+    at = [int(np.argmin(np.linalg.norm(skeleton.vertices - position[v], axis=1))) for v in remaining]
+    assert sorted(at) == list(range(len(remaining)))
+    np.testing.assert_allclose(skeleton.vertices[at], [position[v] for v in remaining], atol=1e-12)
+    new = dict(zip(remaining, at, strict=True))
+    edges = {(min(new[a], new[b]), max(new[a], new[b])) for a in remaining for b in links[a]}
     assert {tuple(e) for e in skeleton.edges.tolist()} == edges
     vertex = {v: new[group] for group, inside in members.items() for v in inside} | {-1: -1}
     np.testing.assert_array_equal(skeleton.vertex_of_point, [vertex[v] for v in raw.vertex_of_point.tolist()])
 
 
 @pytest.mark.parametrize(("collapse", "merged"), [("length", [0, 0.05, 0]), ("degree", [2.5, 0, 0])])
-def test_a_triangle_with_a_tail(refine, collapse, merged):
+def test_a_triangle_with_a_tail_collapses_by_length_or_degree(refine, collapse, merged):
     """Its long edge is between two free corners, its short one at the corner with the tail."""
     corners = np.array([[0, 0, 0], [5, 0, 0], [0, 0.1, 0], [0, 1, 0]])
     edges, owner = [(0, 1), (0, 2), (1, 2), (2, 3)], np.repeat(np.arange(4), 9)

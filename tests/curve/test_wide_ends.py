@@ -47,36 +47,36 @@ def led(curve, points, normals):
 def test_the_curve_goes_straight_through_a_disc(wander, backward):
     x = np.linspace(-0.68, 0.2, 40)
     curve = np.column_stack([x, wander(np.clip((x + 0.25) / 0.45, 0, 1)), 0 * x])
-    given, found = led(curve[::-1] if backward else curve, *paddle())
+    given, levelled = led(curve[::-1] if backward else curve, *paddle())
     inside, handle = given.vertices[:, 0] > -0.15, given.vertices[:, 0] < -0.4
-    assert np.abs(found.vertices[inside, 1]).mean() < 0.015
-    assert found.vertices[:, 0].max() > 0.2  # as far as the rim
-    np.testing.assert_array_equal(found.vertices[handle], given.vertices[handle])
-    np.testing.assert_array_equal(found.edges, given.edges)
+    assert np.abs(levelled.vertices[inside, 1]).mean() < 0.015
+    assert levelled.vertices[:, 0].max() > 0.2  # as far as the rim
+    np.testing.assert_array_equal(levelled.vertices[handle], given.vertices[handle])
+    np.testing.assert_array_equal(levelled.edges, given.edges)
     of_handle = handle[given.vertex_of_point]
-    np.testing.assert_array_equal(found.vertex_of_point[of_handle], given.vertex_of_point[of_handle])
+    np.testing.assert_array_equal(levelled.vertex_of_point[of_handle], given.vertex_of_point[of_handle])
 
 
-def test_other_ends_stay_as_they_are():
+def test_bars_and_long_limbs_are_no_wide_ends():
     """A bar has no neck, and what is far longer than wide behind one is a limb of its own."""
     x = np.linspace(-0.68, 0.2, 40)
-    given, found = led(np.column_stack([x, 0 * x, 0 * x]), *paddle(disc=0.06, handle=0.05))
-    assert found is given
+    given, levelled = led(np.column_stack([x, 0 * x, 0 * x]), *paddle(disc=0.06, handle=0.05))
+    assert levelled is given
     points, normals = paddle(handle=0.02)
-    given, found = led(np.column_stack([6 * x, 0 * x, 0 * x]), points * [6, 1, 1], normals)
-    assert found is given
+    given, levelled = led(np.column_stack([6 * x, 0 * x, 0 * x]), points * [6, 1, 1], normals)
+    assert levelled is given
 
 
-def test_both_ends_may_be_wide():
+def test_both_ends_of_a_dumbbell_are_wide():
     """A dumbbell of two discs, the second as far behind the handle's end as the first before it."""
     points, normals = paddle()
     own = points[:, 0] > -0.5
     points, normals = points[own], normals[own]
     x = np.linspace(-1.15, 0.15, 60)
     both = np.concatenate([points, points * [-1, 1, 1] - [1, 0, 0]]), np.concatenate([normals, normals * [-1, 1, 1]])
-    given, found = led(np.column_stack([x, 0 * x, 0 * x]), *both)
-    moved = np.linalg.norm(found.vertices - given.vertices, axis=1) > 0
+    given, levelled = led(np.column_stack([x, 0 * x, 0 * x]), *both)
+    moved = np.linalg.norm(levelled.vertices - given.vertices, axis=1) > 0
     np.testing.assert_array_equal(
         moved, np.abs(given.vertices[:, 0] + 0.5) > np.abs(given.vertices[~moved, 0] + 0.5).max()
     )
-    assert np.ptp(found.vertices[:, 0]) > 1.4  # both reach their rims
+    assert np.ptp(levelled.vertices[:, 0]) > 1.4  # both reach their rims

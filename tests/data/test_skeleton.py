@@ -40,11 +40,11 @@ HAND_MADE = {
 
 
 @pytest.mark.parametrize("which", HAND_MADE)
-def test_hand_made_graphs(which):
+def test_counts_and_branches_of_hand_made_graphs_are_known(which):
     m, edges, counts, branches = HAND_MADE[which]
     skeleton = skeleton_of(m, edges)
-    found = skeleton.n_components, skeleton.n_loops, len(skeleton.leaves), len(skeleton.junctions)
-    assert found == counts
+    actual = skeleton.n_components, skeleton.n_loops, len(skeleton.leaves), len(skeleton.junctions)
+    assert actual == counts
     assert sorted(map(len, skeleton.branches)) == branches
     for count, name in zip(counts, ("components", "loops", "leaves", "junctions"), strict=True):
         assert f"{count} {name}" in repr(skeleton)
@@ -53,7 +53,7 @@ def test_hand_made_graphs(which):
 @pytest.mark.slow
 @settings(max_examples=150)
 @given(st.integers(1, 14), st.sets(st.tuples(st.integers(0, 13), st.integers(0, 13))))
-def test_random_graphs_against_networkx(m, edges):
+def test_a_random_graph_is_that_of_networkx(m, edges):
     edges = {(a, b) for a, b in edges if a < b < m}
     skeleton, graph = skeleton_of(m, edges), nx.Graph()
     graph.add_nodes_from(range(m))
@@ -140,7 +140,7 @@ LINE = dict(
         ("report", {}, "report = {}: must be a Report"),
     ],
 )
-def test_a_skeleton_is_sound_or_it_is_not_made(name, value, message):
+def test_an_unsound_skeleton_is_refused(name, value, message):
     Skeleton(**LINE)
     with pytest.raises(InvalidParameterError, match=message):
         Skeleton(**{**LINE, name: value})

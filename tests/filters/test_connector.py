@@ -26,7 +26,7 @@ def state(request):
 
 @pytest.mark.parametrize("name", VARIANTS)
 @pytest.mark.parametrize("shape", ["tube", "torus", "two_rings", "sheet"])
-def test_gives_a_sound_skeleton(name, shape, assert_sound):
+def test_a_connected_cloud_is_a_sound_skeleton(name, shape, assert_sound):
     points = samples.SAMPLES[shape](n=500).points
     skeleton = VARIANTS[name](contracted(points, LPRReducer()))
     assert isinstance(skeleton, Skeleton)
@@ -51,7 +51,7 @@ def test_vertices_are_the_weighted_means_of_their_points_and_rings_join_them(sta
     assert (skeleton.degree > 0).all()
 
 
-def test_balls_of_one_radius_cover_and_keep_apart():
+def test_balls_of_one_radius_hold_their_points():
     state = contracted(samples.y_junction(n=800).points)
     sizes = []
     for radius in (0.01, 0.03, 0.1, 0.3):
@@ -65,17 +65,17 @@ def test_balls_of_one_radius_cover_and_keep_apart():
     assert sizes[0] > 3 * sizes[-1]
 
 
-def test_surface_is_told_by_what_had_a_ring_and_by_noise():
+def test_points_with_a_ring_and_noisy_points_show_the_surface():
     """Of a dense clean part the points that the thinner left, even if they were merged since, of noise all."""
     rng = np.random.default_rng(0)
     clean, noisy = samples.tube(n=6000).points, samples.tube(n=1500).points + [0, 0, 3]
     points = np.concatenate([clean, noisy + rng.normal(scale=0.04, size=noisy.shape)])
-    begun = pipelines.rings()(points)
-    assert (begun.noise[begun.map.row_of_point[6000:]] > 0).mean() > 0.9
-    state = Contractor(reducer=LPRReducer(), max_iterations=3)(begun)
-    assert len(state) < len(begun)
-    told = Connector()(state).surface_points
-    spoilt = np.flatnonzero(begun.map.sampled & (begun.noise[begun.map.row_of_point] > 0))
-    np.testing.assert_array_equal(told, np.union1d(begun.map.point_of_survivor, spoilt))
-    assert (told < 6000).sum() < 4000 < 6000
-    assert np.isin(told, Connector()(state).supporting_points).all()
+    noisy_rings = pipelines.rings()(points)
+    assert (noisy_rings.noise[noisy_rings.map.row_of_point[6000:]] > 0).mean() > 0.9
+    state = Contractor(reducer=LPRReducer(), max_iterations=3)(noisy_rings)
+    assert len(state) < len(noisy_rings)
+    shown = Connector()(state).surface_points
+    spoilt = np.flatnonzero(noisy_rings.map.sampled & (noisy_rings.noise[noisy_rings.map.row_of_point] > 0))
+    np.testing.assert_array_equal(shown, np.union1d(noisy_rings.map.point_of_survivor, spoilt))
+    assert (shown < 6000).sum() < 4000 < 6000
+    assert np.isin(shown, Connector()(state).supporting_points).all()

@@ -23,7 +23,7 @@ def thread(noise=0.2, n=400):
 
 @settings(max_examples=30)
 @given(st.integers(0, 10**6), st.integers(1, 30), st.integers(1, 9))
-def test_noise_share_by_its_definition(seed, n, k):
+def test_the_noise_share_is_that_of_its_definition(seed, n, k):
     rng = np.random.default_rng(seed)
     spread, neighbours = np.sort(rng.random((n, 3)), axis=1), rng.integers(0, n, (n, k))
     spread[:: n // 2 + 1] = 0  # points in one place
@@ -34,7 +34,7 @@ def test_noise_share_by_its_definition(seed, n, k):
 
 
 @pytest.mark.parametrize("share", [1, 0.25])
-def test_one_pass_by_its_definition(share):
+def test_one_pass_is_that_of_its_definition(share):
     """A share of the way to the mean of the neighbours in a Gaussian, but for that along their main direction."""
     points = thread(n=60)
     moved = subspace_mean_shift(points, np.full(60, share), 1)
@@ -54,7 +54,7 @@ def in_order(points):
 
 
 @pytest.mark.parametrize("noise", [0.04, 0.06])
-def test_denoising_moves_noisy_points_to_their_ridge_(noise):
+def test_noisy_points_move_to_their_ridge(noise):
     """Points that stand alone there are outliers too."""
     points = samples.tube(n=2000, radius=0.1, noise=noise, seed=2).points
     plain, state = Sampler()(points), (Sampler() | Denoiser())(points)

@@ -35,7 +35,7 @@ def state(request):
     return contracted(CLOUDS[request.param])
 
 
-def test_runs_alone_as_a_filter_after_a_contraction():
+def test_a_reducer_is_a_filter_after_a_contraction():
     with pytest.raises(StageError, match="Contractor"):
         LPRReducer()(RingBuilder()(CLOUDS["torus"]))
     pipeline = RingBuilder() | Contractor(max_iterations=1) | LPRReducer()
@@ -59,14 +59,14 @@ def slow_energy(state):
     return np.array(energies)
 
 
-def test_energy_against_the_equations(state):
+def test_merge_energies_are_those_of_the_equations(state):
     for case in (state, contracted(state.points, 3, LPRReducer())):
         np.testing.assert_allclose(merge_energy(case), slow_energy(case), rtol=1e-9)
 
 
 @settings(max_examples=100)
 @given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, 9)).filter(lambda pair: pair[0] != pair[1]), max_size=25))
-def test_matching_is_greedy(pairs):
+def test_a_matching_is_greedy(pairs):
     representatives, swallowed = (np.array([pair[end] for pair in pairs], int) for end in (0, 1))
     chosen = match(10, representatives, swallowed).tolist()
     taken = set()
@@ -80,7 +80,7 @@ def test_matching_is_greedy(pairs):
 
 
 @pytest.mark.parametrize("reducer", VARIANTS, ids=repr)
-def test_bookkeeping_of_a_pass(state, reducer):
+def test_a_pass_merges_pairs_and_accounts_for_every_point(state, reducer):
     after = reducer(state)
     assert len(state) / 2 <= len(after) < len(state)
     assert set(after.survivors.tolist()) < set(state.survivors.tolist())

@@ -33,7 +33,7 @@ NUMBERS = {
 
 
 @pytest.mark.parametrize("rule", NUMBERS, ids=lambda rule: rule.__name__)
-def test_numbers_by_the_number_of_points(rule):
+def test_the_number_of_neighbours_follows_from_that_of_points(rule):
     assert [(n, rule(n)) for n, _ in NUMBERS[rule]] == NUMBERS[rule]
 
 
@@ -55,7 +55,7 @@ def test_rings_are_delaunay_stars_in_the_principal_plane(points, k):
         assert state.rings.closed[i] == (0 not in triangulation.convex_hull)
 
 
-def test_order_place_size_and_rotation_do_not_matter():
+def test_rings_do_not_depend_on_order_place_size_and_rotation():
     """Coordinates are rounded so that offset and factor are exact: then all rings are the same."""
     points, rng = np.round(TORUS * 2**20) / 2**20, np.random.default_rng(0)
     rings = named_rings(RingBuilder()(points))
@@ -67,7 +67,7 @@ def test_order_place_size_and_rotation_do_not_matter():
         assert ({*order[row].tolist()}, closed) == ({*expected}, is_closed)
 
 
-def test_radius_limits_the_rings():
+def test_a_radius_limits_the_rings():
     free, wide = RingBuilder(k=16)(TORUS), RingBuilder(k=16, radius=10.0)(TORUS)
     np.testing.assert_array_equal(free.rings.indices, wide.rings.indices)
     radius = 0.09

@@ -30,7 +30,7 @@ def records(**columns):
         (RingSizeRatio(0.25), [0.5, 0.251], 2),
     ],
 )
-def test_stopping_rules(rule, values, stops_after):
+def test_a_rule_stops_at_its_threshold(rule, values, stops_after):
     name = "explained_change" if isinstance(rule, ExplainedScore) else "ring_ratio"
     history = records(**{name: values})
     stops = [i + 1 for i in range(len(history)) if rule(history[: i + 1]) is not None]

@@ -21,7 +21,7 @@ def mislead(mesh):
 # ------------------------------------------------------------------------------------------------------------- samples
 
 
-def test_every_triangle_has_its_share():
+def test_every_triangle_has_its_share_of_places():
     vertices, triangles = arrays(SHAPES.create_cone(1.0, 4.0, 12, 3))
     places, corners, normals, whole = sample_by_area(vertices, triangles, 5000)
     assert places.shape == normals.shape == corners.shape == (5000, 3)
@@ -42,7 +42,7 @@ def test_every_triangle_has_its_share():
     assert weight[:, :2].sum(axis=1).max() < 1 + 1e-12
 
 
-def test_moments_of_a_triangle():
+def test_places_in_a_triangle_have_its_moments():
     """Of 1000 even places they are off by less than .002, of random ones by .007."""
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]])
     places = sample_by_area(corners, np.array([[0, 1, 2]]), 1000)[0]
@@ -50,7 +50,7 @@ def test_moments_of_a_triangle():
     np.testing.assert_allclose((places**2).mean(axis=0), [1 / 6, 1 / 6, 0], atol=2e-3)
 
 
-def test_the_order_of_triangles_does_not_count():
+def test_places_do_not_depend_on_the_order_of_triangles():
     vertices, triangles = arrays(SHAPES.create_torus(1, 0.3, 8, 5))
     shuffled = np.random.default_rng(1).permutation(triangles)
     for other in (triangles, shuffled):
@@ -59,7 +59,7 @@ def test_the_order_of_triangles_does_not_count():
 
 
 @pytest.mark.parametrize("scale", [1e-100, 1.0, 1e100])
-def test_triangles_without_area_or_end_have_none(scale):
+def test_triangles_without_area_or_end_have_no_places(scale):
     vertices = scale * np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [np.nan, 0, 0]])
     assert len(sample_by_area(vertices, np.array([[0, 1, 2], [0, 0, 3], [0, 1, 4]]), 10)[0]) == 0
     assert len(sample_by_area(vertices, np.empty((0, 3), int), 10)[0]) == 0
@@ -68,7 +68,7 @@ def test_triangles_without_area_or_end_have_none(scale):
     np.testing.assert_allclose(area, scale**2 / 2)
 
 
-def test_places_far_from_the_origin():
+def test_places_far_from_the_origin_are_as_exact():
     vertices, triangles = arrays(SHAPES.create_box())
     far = np.array([5e5, 5.5e6, 300.0])
     np.testing.assert_allclose(
@@ -124,7 +124,7 @@ COARSE = {
 
 
 @pytest.mark.parametrize("name", DENSE)
-def test_vertices_of_dense_meshes_and_clouds_do(name):
+def test_vertices_of_dense_meshes_and_clouds_do_not_mislead(name):
     assert not mislead(DENSE[name])
 
 
@@ -134,7 +134,7 @@ def test_vertices_of_coarse_meshes_and_needles_mislead(name):
 
 
 @pytest.mark.parametrize(("name", "halvings"), [("a cube", 5), ("a tube of two circles", 6)])
-def test_the_size_does_not_count_and_subdivision_mends_it(name, halvings):
+def test_vertices_mislead_at_any_size_until_triangles_are_subdivided(name, halvings):
     mesh = SHAPES(COARSE[name])
     for _ in range(halvings):
         assert mislead(mesh) == mislead(SHAPES(mesh).scale(1e-6, (1, 2, 3))) == mislead(soup(mesh))

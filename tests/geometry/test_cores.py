@@ -27,7 +27,7 @@ def test_threads_are_as_many_as_openmp_may_use(said, expected, monkeypatch):
 
 
 @pytest.mark.parametrize("n", [1, 3])
-def test_threads_give_what_they_made_in_order_and_take_few_items_ahead(n, monkeypatch):
+def test_threads_give_results_in_order_and_take_few_items_ahead(n, monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", str(n))
     taken = []
 
@@ -43,12 +43,12 @@ def test_threads_give_what_they_made_in_order_and_take_few_items_ahead(n, monkey
 
 
 @pytest.mark.parametrize("n", [1, 3])
-def test_what_goes_wrong_in_a_thread_is_told(n, monkeypatch):
+def test_an_error_in_a_thread_is_raised(n, monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", str(n))
-    found = in_threads(lambda number: 6 // number, [3, 0, 1])
-    assert next(found) == 2
+    results = in_threads(lambda number: 6 // number, [3, 0, 1])
+    assert next(results) == 2
     with pytest.raises(ZeroDivisionError):
-        next(found)
+        next(results)
 
 
 def test_an_interpreter_that_ends_goes_on_without_threads():
@@ -62,7 +62,7 @@ def test_an_interpreter_that_ends_goes_on_without_threads():
 
 
 @pytest.mark.parametrize("n", [1, 3])
-def test_who_stops_early_does_not_wait_for_what_has_not_begun(n, monkeypatch):
+def test_a_caller_that_stops_early_does_not_wait_for_tasks_that_have_not_begun(n, monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", str(n))
     begun, go_on = [], threading.Event()
 
@@ -72,14 +72,14 @@ def test_who_stops_early_does_not_wait_for_what_has_not_begun(n, monkeypatch):
             go_on.wait(10)
         return number
 
-    found = in_threads(wait, range(20), 2)
-    assert next(found) == 0
+    results = in_threads(wait, range(20), 2)
+    assert next(results) == 0
     go_on.set()
-    found.close()
+    results.close()
     assert len(begun) <= 4
 
 
-def test_no_more_threads_than_asked_for(monkeypatch):
+def test_threads_are_no_more_than_asked_for(monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "5")
     names = set(in_threads(lambda _: threading.current_thread().name, range(50), 2))
     assert len(names) <= 2

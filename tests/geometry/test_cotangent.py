@@ -43,7 +43,7 @@ def relative(difference, reference):
     return abs(difference).max() / abs(reference).max()
 
 
-def test_is_twice_the_matrix_of_libigl():
+def test_the_laplacian_is_twice_the_matrix_of_libigl():
     """Wherever, how large and however turned the mesh is."""
     points, faces = sheet_mesh()
     rings = mesh_rings(len(points), faces)
@@ -56,7 +56,7 @@ def test_is_twice_the_matrix_of_libigl():
         assert relative(cotangent_laplacian(moved, rings) - ours, ours) < tolerance
 
 
-def test_triangle_by_hand():
+def test_the_laplacian_of_one_triangle_is_known():
     # angles: 90 degrees at 0, 60 at 1, 30 at 2
     points = np.array([[0, 0, 0], [1, 0, 0], [0, np.sqrt(3), 0]])
     rings = rings_of([[1, 2], [2, 0], []], [False] * 3)
@@ -65,7 +65,7 @@ def test_triangle_by_hand():
     np.testing.assert_allclose(cotangent_laplacian(points, rings).toarray(), expected, atol=1e-14)
 
 
-def test_linear_precision_on_plane_umbrellas():
+def test_the_laplacian_of_plane_umbrellas_has_linear_precision():
     rng = np.random.default_rng(0)
     flat, faces = sheet_mesh()
     points = flat * [1, 1, 0] @ np.linalg.qr(rng.normal(size=(3, 3)))[0] + rng.normal(size=3)

@@ -67,22 +67,22 @@ WHOLE = st.integers(-4, 4)
 @pytest.mark.slow
 @settings(max_examples=800)
 @given(st.lists(st.tuples(WHOLE, WHOLE, st.booleans() | st.just(True)), min_size=1, max_size=14))
-def test_against_exact_arithmetic(rows):
+def test_a_star_is_that_of_exact_arithmetic(rows):
     offsets, valid = [row[:2] for row in rows], [row[2] for row in rows]
     expected, closed = exact_star(offsets, valid)
     ring, is_closed = star(offsets, valid)
-    found = [offsets[j] for j in ring]
+    actual = [offsets[j] for j in ring]
     assert is_closed == closed
     assert all(valid[j] for j in ring)
     if closed:
-        assert turned(found) == turned(expected)
-        assert sum(c * c for c in found[0]) == min(sum(c * c for c in p) for p in found)
+        assert turned(actual) == turned(expected)
+        assert sum(c * c for c in actual[0]) == min(sum(c * c for c in p) for p in actual)
     else:
         straight = len(expected) == 2 and expected[0][0] * expected[1][1] == expected[0][1] * expected[1][0]
-        assert found == expected or (straight and found == expected[::-1])
+        assert actual == expected or (straight and actual == expected[::-1])
 
 
-def test_grids_that_are_hardly_disturbed():
+def test_a_star_in_a_hardly_disturbed_grid_is_that_of_exact_arithmetic():
     """Squares with corners off by 1e-8 of their side: four neighbours are nearly, but not, on one circle."""
     rng, side = np.random.default_rng(0), np.arange(-2, 3) * 10**12
     grid = np.stack(np.meshgrid(side, side), -1).reshape(-1, 2)

@@ -21,14 +21,14 @@ def entries(made):
 
 @pytest.mark.parametrize("scale", [1e-12, 1, 1e12])
 @pytest.mark.parametrize("spread", SPREADS)
-def test_against_known_ones(spread, scale):
+def test_eigenvalues_and_directions_are_the_known_ones(spread, scale):
     made, turns = matrices(scale * np.array(spread, float))
     made = entries(made)
     values, least = principal_parts(made)
     # where two are the same the closed form is good to the root of rounding
-    for found, known, others in zip(values, spread, ((1,), (0, 2), (1,)), strict=True):
+    for actual, known, others in zip(values, spread, ((1,), (0, 2), (1,)), strict=True):
         alone = min(abs(known - spread[other]) for other in others) > 1e-3
-        np.testing.assert_allclose(found, scale * known, rtol=1e-12, atol=scale * (1e-14 if alone else 3e-8))
+        np.testing.assert_allclose(actual, scale * known, rtol=1e-12, atol=scale * (1e-14 if alone else 3e-8))
     np.testing.assert_array_equal(values[2], largest_eigenvalue(made))
     for directions, column, beside in ((least, 0, 1), (main_direction(made), 2, 1)):
         np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1, rtol=1e-12)
@@ -41,7 +41,7 @@ def test_against_known_ones(spread, scale):
 
 
 @pytest.mark.parametrize("gap", [1e-2, 1e-4, 1e-6, 1e-8, 1e-10])
-def test_directions_of_eigenvalues_that_hardly_stand_out(gap):
+def test_directions_of_eigenvalues_that_hardly_stand_out_are_exact(gap):
     """As good as the matrix itself lets them be, on either side of where NumPy takes over."""
     made, turns = matrices(np.array([0, gap, 1]))
     along = np.abs(np.einsum("ni,ni->n", principal_parts(entries(made))[1], turns[:, :, 0]))

@@ -12,7 +12,7 @@ CLOUD = np.random.default_rng(0).normal(size=(500, 3)) * [1, 3, 0.2]
 
 @pytest.mark.parametrize("scale", [1e-300, 1.0, 1e300])
 @pytest.mark.parametrize("offset", [0, 1e6])
-def test_frame_is_centred_and_1_6_wide(scale, offset):
+def test_a_frame_is_centred_and_1_6_wide(scale, offset):
     points = (CLOUD + offset) * scale
     frame = Frame.of(points)
     inside = frame.into(points)
@@ -24,7 +24,7 @@ def test_frame_is_centred_and_1_6_wide(scale, offset):
     np.testing.assert_allclose(frame.out_of(inside), points, atol=digits * scale * 10, rtol=0)
 
 
-def test_frame_of_a_large_offset_costs_no_digits():
+def test_a_frame_of_a_large_offset_costs_no_digits():
     exact = np.round(CLOUD * 2**20) / 2**20  # sums with the offset are exact
     near, far = Frame.of(exact), Frame.of(exact + 1e6)
     np.testing.assert_array_equal(far.into(exact + 1e6), near.into(exact))
@@ -40,7 +40,7 @@ def size(frame):
 
 
 @pytest.mark.parametrize("sides", [(1, 3, 2), (7, 0.5, 0), (0, 0, 2)])
-def test_spread_of_an_evenly_filled_box_is_that_box(sides):
+def test_the_spread_of_an_evenly_filled_box_is_that_box(sides):
     """Middles of n^3 equal cells of it: n points to a side have 1 - 1 / n^2 of its variance."""
     n = 5
     share = (np.arange(n) + 0.5) / n - 0.5
@@ -52,7 +52,7 @@ def test_spread_of_an_evenly_filled_box_is_that_box(sides):
 
 
 @pytest.mark.parametrize("scale", [1e-12, 1e12])
-def test_spread_goes_with_the_cloud(scale):
+def test_the_spread_turns_and_scales_with_the_cloud(scale):
     rng, shift = np.random.default_rng(0), 1e4
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     moved = (rng.permutation(CLOUD) @ turn + shift) * scale
@@ -66,7 +66,7 @@ def test_spread_goes_with_the_cloud(scale):
 # ---- Morton order
 
 
-def test_against_interleaved_python_integers():
+def test_the_morton_order_is_that_of_interleaved_integers():
     """Bits of x, y, z, x lowest."""
 
     def code(cell):
@@ -79,9 +79,9 @@ def test_against_interleaved_python_integers():
 
 
 @pytest.mark.parametrize(("offset", "fine"), [(1e12, True), (1e13, True), (2e14, False), (1e15, False)])
-def test_what_is_lost_in_rounding_is_refused(offset, fine):
+def test_a_cloud_that_rounding_destroys_is_refused(offset, fine):
     points = CLOUD + [0, offset, 0]
     if fine:
         return check_extent(points)
-    with pytest.raises(InvalidCloudError, match=r"lost in rounding; subtract an offset before"):
+    with pytest.raises(InvalidCloudError, match="rounding"):
         check_extent(points)

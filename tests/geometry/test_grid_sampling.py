@@ -32,13 +32,13 @@ def clouds():
 @pytest.mark.parametrize("points", [pytest.param(points, id=name) for name, points in clouds()])
 def test_the_sample_of_blocks_is_that_of_the_whole(points, rows):
     kept, _, weight = sample_grid(points, 2500)
-    found, counts = sample_blocks(in_blocks(points, rows), lambda n: 2500)
-    np.testing.assert_array_equal(found, points[kept])
+    actual, counts = sample_blocks(in_blocks(points, rows), lambda n: 2500)
+    np.testing.assert_array_equal(actual, points[kept])
     np.testing.assert_array_equal(counts, weight)
 
 
 @pytest.mark.parametrize(("n", "rows"), [(5001, 1000), (5001, 5000), (300, 1)])
-def test_blocks_that_have_nothing_nearer_change_nothing(n, rows):
+def test_a_small_last_block_changes_nothing(n, rows):
     """Such as a last block of one point."""
     for seed in range(5):
         points = np.random.default_rng(seed).random((n, 3))
@@ -47,7 +47,7 @@ def test_blocks_that_have_nothing_nearer_change_nothing(n, rows):
 
 
 @pytest.mark.parametrize(("chunk", "threads"), [(37, 1), (1000, 3)])
-def test_threads_and_how_many_points_at_a_time_change_nothing(chunk, threads, monkeypatch):
+def test_a_sample_does_not_depend_on_threads_and_chunks(chunk, threads, monkeypatch):
     rng = np.random.default_rng(0)
     # one cell has more points than a chunk, and many of them are copies
     points = np.concatenate([rng.random((4000, 3)), 0.5 + 1e-4 * rng.random((3000, 3)), np.full((2000, 3), 0.25)])
@@ -56,8 +56,8 @@ def test_threads_and_how_many_points_at_a_time_change_nothing(chunk, threads, mo
     known = sample_grid(points, 500), sample_blocks(in_blocks(points, 2500), lambda _: 500)
     monkeypatch.setattr(grid_sampling, "GRID_CHUNK", chunk)
     monkeypatch.setenv("OMP_NUM_THREADS", str(threads))
-    found = sample_grid(points, 500), sample_blocks(in_blocks(points, 2500), lambda _: 500)
-    for one, other in zip(known[0] + known[1], found[0] + found[1], strict=True):
+    actual = sample_grid(points, 500), sample_blocks(in_blocks(points, 2500), lambda _: 500)
+    for one, other in zip(known[0] + known[1], actual[0] + actual[1], strict=True):
         np.testing.assert_array_equal(one, other)
 
 

@@ -17,22 +17,22 @@ def on_capsule(n, seed=0):
 
 def test_balls_in_a_tube_have_its_radius():
     points, out = on_capsule(4000)
-    radius, apart = inscribed_balls(points, out)
+    radius, contacts = inscribed_balls(points, out)
     middle = np.abs(points[:, 0] - 0.75) < 0.6
     assert np.quantile(np.abs(radius[middle] / 0.1 - 1), 0.95) < 0.05
-    assert 0 < apart.min() <= apart.max() <= 1
+    assert 0 < contacts.min() <= contacts.max() <= 1
     away = np.min(np.linalg.norm((points - radius[:, None] * out)[:50, None] - points, axis=2), axis=1)
     assert (away > 0.998 * radius[:50]).all()  # they are empty
 
 
-def test_from_outside_there_is_none():
+def test_balls_outside_of_a_tube_touch_nothing():
     points, out = on_capsule(1000)
-    radius, apart = inscribed_balls(points, -out)
-    assert (apart == 0).all()
+    radius, contacts = inscribed_balls(points, -out)
+    assert (contacts == 0).all()
     assert (radius == 0.8).all()
 
 
-@pytest.mark.parametrize("name", ["tube", "torus", "y_junction", "sauropod", "two_rings"])
+@pytest.mark.parametrize("name", ["torus", "y_junction", "two_rings"])
 @pytest.mark.parametrize("noise", [0.0, 0.005])
 def test_normals_point_outward_and_places_are_inside(name, noise):
     """Also of several parts, and of a hole's wall: half of a torus is bent like that."""

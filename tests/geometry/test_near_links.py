@@ -11,11 +11,11 @@ LINE = np.column_stack([np.arange(40.0), np.zeros((40, 2))])
 
 
 @pytest.mark.parametrize("n", [0, 1, 2, 3])
-def test_few_points(n):
+def test_few_points_have_a_matrix_of_links(n):
     assert near_links(LINE[:n]).shape == (n, n)
 
 
-def test_growth_along_curves_on_surfaces_and_in_space():
+def test_links_grow_as_the_dimension_of_a_cloud():
     growth = [np.median(link_growth(near_links(RNG.random((3000, 3)) * size))) for size in ([1, 0, 0], [1, 1, 0], 1)]
     np.testing.assert_allclose(growth, [5 / 3, 2.55, 4.1], atol=0.15)
 
@@ -44,3 +44,10 @@ def test_a_gap_ahead_is_joined_before_a_narrower_one_to_the_side():
     _, added = join_pieces(lines, near_links(lines), np.full(120, np.inf))
     assert [39, 40] in np.sort(added).tolist()
     assert (np.abs(lines[added[:, 0], 1] - lines[added[:, 1], 1]) > 4).sum() == 1
+
+
+@pytest.mark.parametrize(("near", "far", "joined"), [(6, 0, 1), (0, 6, 1), (5.9, 5.9, 0)])
+def test_a_gap_is_joined_if_it_is_short_enough_for_one_of_its_ends(near, far, joined):
+    lines = np.concatenate([LINE, LINE + [45, 0, 0]])
+    _, added = join_pieces(lines, near_links(lines), np.repeat([near, far], 40))
+    assert len(added) == joined

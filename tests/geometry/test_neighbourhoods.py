@@ -18,7 +18,7 @@ CLOUD = RNG.normal(size=(300, 3))
 
 
 @pytest.mark.parametrize("k", [1, 2, 9, 300])
-def test_nearest_neighbours_against_all_distances(k):
+def test_nearest_neighbours_are_those_of_all_distances(k):
     distance, neighbours = nearest_neighbours(CLOUD, k)
     brute = cdist(CLOUD, CLOUD)
     np.testing.assert_allclose(distance, np.sort(brute, axis=1)[:, :k], rtol=1e-12)
@@ -66,14 +66,14 @@ def test_threads_may_be_interrupted():
 
 @pytest.mark.parametrize("share", [0.1, 0.9, 1.0])
 @pytest.mark.parametrize("k", [1, 5, 12])
-def test_nearest_among_those_left_as_if_asked_anew(share, k):
-    left = RNG.random(300) < share
-    left[:k] = True
-    expected = nearest_neighbours(CLOUD[left], k)[1]
-    np.testing.assert_array_equal(nearest_left(CLOUD, nearest_neighbours(CLOUD, 12)[1], left, k), expected)
+def test_nearest_remaining_points_are_as_if_asked_anew(share, k):
+    remaining = RNG.random(300) < share
+    remaining[:k] = True
+    expected = nearest_neighbours(CLOUD[remaining], k)[1]
+    np.testing.assert_array_equal(nearest_left(CLOUD, nearest_neighbours(CLOUD, 12)[1], remaining, k), expected)
 
 
-def test_against_covariances():
+def test_principal_components_are_those_of_covariances():
     neighbours = nearest_neighbours(CLOUD, 12)[1]
     spread, normals = principal(CLOUD, neighbours)
     covariance = np.stack([np.cov(p.T, bias=True) for p in CLOUD[neighbours]])

@@ -18,7 +18,7 @@ def fan(opening, n=4000):
     ids=["tube", "half", "quarter", "sheet"],
 )
 @pytest.mark.parametrize("doubt", [0, 0.25, 1])
-def test_between_planes_and_points(normals, flatness, doubt):
+def test_robust_radii_lie_between_planes_and_points(normals, flatness, doubt):
     """A quarter of a tube: the shares are 1/2 + 1/pi and 1/2 - 1/pi."""
     turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
     owner = np.zeros(len(normals), int)
@@ -27,7 +27,7 @@ def test_between_planes_and_points(normals, flatness, doubt):
     np.testing.assert_allclose(radii, [1 + np.sqrt(doubt) * (1 - flatness) * (3 - 1), 7], rtol=1e-6)
 
 
-def test_planes_of_a_tube_wherever_along_it():
+def test_planes_of_a_tube_have_its_radius_wherever_along_it():
     normals = fan(2 * np.pi, 12)
     points = 0.1 * normals + np.linspace(-1, 1, 12)[:, None] * [1, 0, 0]
     owner = np.array([0] * 6 + [1] * 5 + [-1])

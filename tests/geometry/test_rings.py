@@ -32,7 +32,7 @@ def case(request):
     return lists, closed, rings_of(lists, closed)
 
 
-def test_rows_triangles_and_lengths(case):
+def test_rows_triangles_and_lengths_are_those_of_loops(case):
     lists, closed, rings = case
     assert (lists_of(rings), rings.closed.tolist()) == (lists, closed)
     assert rings.sizes.tolist() == [len(row) for row in lists]
@@ -51,7 +51,7 @@ def test_rows_triangles_and_lengths(case):
     np.testing.assert_allclose(distance, [min(row) for row in slow], rtol=1e-14)
 
 
-def test_take_replace_pad_and_concatenate(case):
+def test_rings_are_taken_replaced_padded_and_concatenated_row_by_row(case):
     lists, closed, rings = case
     rows = np.array([7, 3, 3, 39, 0])
     taken = rings.take(rows)
@@ -89,6 +89,24 @@ def test_take_replace_pad_and_concatenate(case):
 def test_rename_merges_neighbours_that_fall_together(row, closed, index, expected):
     names = np.array([index.get(j, j) for j in range(6)])
     assert lists_of(rings_of([row, [5]], [closed, False]).rename(names)) == [expected, [5]]
+
+
+@pytest.mark.parametrize(
+    ("order", "closed", "folded"),
+    [
+        ([1, 2, 3, 4, 5], True, False),
+        ([5, 4, 3, 2, 1], True, False),
+        ([1, 3, 5, 2, 4], True, True),  # twice around
+        ([1, 2, 1, 2, 3], True, True),  # to and fro
+        ([1, 3, 5, 2, 4], False, False),
+    ],
+)
+def test_a_closed_ring_that_does_not_turn_once_around_its_point_is_folded(order, closed, folded):
+    angle = np.arange(5) * 0.4 * np.pi
+    points = np.concatenate([np.zeros((1, 3)), np.column_stack([np.cos(angle), np.sin(angle), 0.3 * np.sin(angle)])])
+    rings = rings_of([order, *[[]] * 5], [closed, *[False] * 5])
+    normals = np.tile([0.0, 0, 1], (6, 1))
+    assert rings.folded(points, normals)[0] == rings.folded(points, -normals)[0] == folded
 
 
 # ---- stars in space

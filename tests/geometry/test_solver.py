@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
-from glsk_o3d import Contractor, samples
+from glsk_o3d import samples
 from glsk_o3d.filters.ring_builder import RingBuilder
 from glsk_o3d.geometry import solver as module
 from glsk_o3d.geometry.cotangent import cotangent_laplacian
@@ -44,7 +44,7 @@ SHAPES = ("torus", "y_junction", "sheet")
 
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("contraction", [0.0, 0.1, 5.0, 100.0, 2048.0])
-def test_against_dense_least_squares(shape, contraction):
+def test_a_solve_is_the_dense_solution_of_least_squares(shape, contraction):
     laplacian, points, size = small_system(shape)
     rows = np.full(len(points), contraction)
     attraction = np.clip(size.mean() / size, 0.2, 5)
@@ -54,7 +54,7 @@ def test_against_dense_least_squares(shape, contraction):
     assert error < 1e-7
 
 
-def test_refinement_mends_what_the_factorisation_misses():
+def test_refinement_corrects_what_the_factorisation_misses():
     """Normal equations of condition 1e14: the plain solution is off by far more than the refined one."""
     n = 60
     rng = np.random.default_rng(3)
@@ -81,14 +81,14 @@ def test_refinement_mends_what_the_factorisation_misses():
         pytest.param(lambda l, r, a, p: (l, 400 * r, 1e-4 * a, p), id="too ill-conditioned"),
     ],
 )
-def test_refuses_what_has_no_trustworthy_solution(spoil):
+def test_a_system_without_a_trustworthy_solution_is_refused(spoil):
     laplacian, points, _ = small_system("torus")
     system = spoil(laplacian, np.full(len(points), 5.0), np.ones(len(points)), points)
     with pytest.raises(SolveError):
         solve_contraction(*system)
 
 
-def test_order_of_elimination_is_kept(monkeypatch):
+def test_the_order_of_elimination_is_kept(monkeypatch):
     """The second system with the same links is solved as the first, without looking for the order again."""
     laplacian, points, size = small_system("torus")
     rows, attraction, elimination = np.full(len(points), 0.5), size.mean() / size, Elimination()
@@ -103,54 +103,3 @@ def test_order_of_elimination_is_kept(monkeypatch):
     alone, _ = solve_contraction(laplacian, 3 * rows, attraction, points)
     assert ordered == [(True,), (False,)]
     np.testing.assert_allclose(x, alone, rtol=0, atol=1e-9)
-
-
-def right_angled(kind, rng):
-    """Points on a grid, whose cotangents are exactly 0 until they have moved."""
-    if kind == "mesh":
-        turn, row = np.meshgrid(np.arange(int(rng.integers(20, 40))), np.arange(40.0))
-        angle = 2 * np.pi * turn.ravel() / (turn.max() + 1)
-        return np.column_stack([np.cos(angle), np.sin(angle), row.ravel() * (angle[1] - angle[0])])
-    sides = rng.integers(9, 16, 3) + [0, 0, 30]
-    points = np.stack(np.meshgrid(*map(np.arange, sides)), -1).reshape(-1, 3)
-    return points[((points == 0) | (points == sides - 1)).any(axis=1)].astype(float)
-
-
-@pytest.mark.parametrize("kind", ["shell", "mesh"])
-@pytest.mark.parametrize("seed", range(3))
-def test_factors_of_later_systems_have_no_more_entries_than_if_they_were_the_first(kind, seed, monkeypatch):
-    """Weights of the first system are exactly 0 on a grid, and those of later ones are not."""
-    sizes, factorised = [], module.factorised
-
-    def counted(matrix, *given, **options):
-        factor = factorised(matrix, *given, **options)
-        sizes.append((matrix.nnz, factor.nnz, factorised(matrix, Equil=False).nnz))
-        return factor
-
-    monkeypatch.setattr(module, "factorised", counted)
-    state = RingBuilder()(right_angled(kind, np.random.default_rng(seed)))
-    Contractor(max_iterations=4)(state)
-    entries, kept, anew = np.array(sizes).T
-    assert entries[1:].max() > entries[0]  # or it would show nothing
-    assert (kept <= 1.1 * anew).all()
-
-
-def test_wide_panels_are_for_solids_and_give_the_same(monkeypatch):
-    panels, places, factorised = [], [], module.factorised
-
-    def noted(matrix, *given, panel, **options):
-        panels.append(panel)
-        return factorised(matrix, *given, panel=panel, **options)
-
-    monkeypatch.setattr(module, "factorised", noted)
-    rng = np.random.default_rng(2)
-    for points in (rng.random((16000, 3)), samples.torus(6000).points):
-        state = RingBuilder()(points)
-        system = cotangent_laplacian(state.positions, state.rings), np.ones(len(state)), np.ones(len(state))
-        places.append(solve_contraction(*system, state.positions)[0])
-        monkeypatch.setattr(module, "WIDE_CUT", 10**9)
-        places.append(solve_contraction(*system, state.positions)[0])
-        monkeypatch.undo()
-        monkeypatch.setattr(module, "factorised", noted)
-    assert panels == [module.WIDE_PANEL, *[module.NARROW_PANEL] * 3]
-    np.testing.assert_allclose(places[0], places[1], rtol=0, atol=1e-9)

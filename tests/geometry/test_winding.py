@@ -38,26 +38,26 @@ def field(points, normals, queries):
 # --------------------------------------------------------------------------------------------------------------- field
 
 
-def test_a_ball():
+def test_the_winding_number_of_a_ball_is_1_inside_0_outside_and_half_on_it():
     points, normals = ball(4000)
     assert areas_of(points).sum() == pytest.approx(4 * np.pi, rel=0.04)
-    found = field(points, normals, np.outer([0, 0.5, 0.9, 1.1, 1.5, 4], X))
-    np.testing.assert_allclose(found, [1, 1, 1, 0, 0, 0], atol=0.04)
+    actual = field(points, normals, np.outer([0, 0.5, 0.9, 1.1, 1.5, 4], X))
+    np.testing.assert_allclose(actual, [1, 1, 1, 0, 0, 0], atol=0.04)
     on_it = field(points, normals, ball(500, seed=1)[0])
     assert on_it.mean() == pytest.approx(0.5, abs=0.05)
     assert on_it.std() < 0.1  # a dipole that is not averaged would spike
 
 
 @pytest.mark.parametrize("half", [False, True])
-def test_a_tube_and_half_of_one(half):
-    found = field(*open_tube(4000, half), np.outer([0, 0.25, 2], X))
+def test_the_winding_number_of_a_tube_and_half_of_one_is_its_solid_angle(half):
+    actual = field(*open_tube(4000, half), np.outer([0, 0.25, 2], X))
     # what an open tube hides of the sphere of directions
     ends = [-0.5, 0.5] - np.array([[0], [0.25], [2]])
     exact = np.diff(ends / np.hypot(ends, 0.1), axis=1)[:, 0] / 2
-    np.testing.assert_allclose(found, exact / (2 if half else 1), atol=0.04)
+    np.testing.assert_allclose(actual, exact / (2 if half else 1), atol=0.04)
 
 
-def test_agrees_with_the_mesh_of_libigl():
+def test_the_winding_number_of_a_mesh_is_that_of_libigl():
     points = ball(1500)[0] * [1, 0.6, 0.3]
     faces = ConvexHull(points).simplices
     a, b, c = points[faces].transpose(1, 0, 2)
@@ -69,12 +69,12 @@ def test_agrees_with_the_mesh_of_libigl():
     double = np.linalg.norm(cross, axis=1)
     queries = np.random.default_rng(0).uniform(-0.5, 0.5, (200, 3)) * [1, 0.6, 0.3]
     exact = igl.winding_number(points, faces.astype(np.int64), queries)
-    found = winding_number((a + b + c) / 3, cross / double[:, None], double / 2, queries)
+    actual = winding_number((a + b + c) / 3, cross / double[:, None], double / 2, queries)
     assert np.ptp(exact) > 0.2
-    np.testing.assert_allclose(found, exact, atol=0.02)
+    np.testing.assert_allclose(actual, exact, atol=0.02)
 
 
-def test_near_a_point_it_is_the_mean_over_a_ball():
+def test_the_winding_number_near_a_point_is_the_mean_over_a_ball():
     point, area = np.zeros((1, 3)), np.array([0.04])
     # seen from the dipole the mean is one over directions: what it sends out along each is constant, times the chord
     z = np.linspace(-1, 1, 200001)[1::2]
@@ -88,7 +88,7 @@ def test_near_a_point_it_is_the_mean_over_a_ball():
         assert winding_number(point, X[None], area, place[None])[0] == pytest.approx(mean, rel=1e-4)
 
 
-def test_does_not_depend_on_pose_units_or_order():
+def test_the_winding_number_does_not_depend_on_pose_units_or_order():
     points, normals = open_tube(1500)
     rng = np.random.default_rng(0)
     queries = rng.uniform(-0.5, 0.5, (100, 3))
@@ -103,7 +103,7 @@ def test_does_not_depend_on_pose_units_or_order():
 
 
 @pytest.mark.parametrize("n", [1, 2, 8])
-def test_few_or_coincident_points(n):
+def test_the_winding_number_of_few_or_coincident_points_is_finite(n):
     coincident = np.ones((n, 3))
     areas = areas_of(coincident)
     assert (areas == 0).all()
@@ -121,5 +121,5 @@ def test_points_that_belong_to_no_axis_follow_their_neighbours():
     axis = np.zeros((500, 3))
     axis[:50] = points[:50] + 0.3 * np.cross(normals[:50], rng.normal(size=(50, 3))) + 0.1 * normals[:50]
     signs = rng.choice([-1.0, 1.0], (500, 1))
-    found = orient_from_axis(points, normals * signs, axis, nearest_neighbours(points, 9)[1])
-    np.testing.assert_array_equal(found, normals)
+    actual = orient_from_axis(points, normals * signs, axis, nearest_neighbours(points, 9)[1])
+    np.testing.assert_array_equal(actual, normals)

@@ -54,7 +54,7 @@ MIXED = [("intensity", 0, 2), ("y", 1, 8), ("x", 13, 7), ("z", 19, 8)]
     ("fields", "step", "height", "padding", "big"),
     [(PLAIN, 12, 1, 0, False), (CAMERA, 32, 3, 0, True), (MIXED, 29, 3, 5, False)],
 )
-def test_points_of_any_layout(packed, sent, make_message, fields, step, height, padding, big):
+def test_points_are_read_from_any_layout(packed, sent, make_message, fields, step, height, padding, big):
     points = np.random.default_rng(1).integers(-999, 999, (12, 3)) / 64  # exact in FLOAT32
     points[4] = np.nan
     points[7, 1] = np.inf
@@ -73,10 +73,10 @@ def test_points_of_any_layout(packed, sent, make_message, fields, step, height, 
 @pytest.mark.parametrize(
     ("fields", "changes", "message"),
     [
-        ([("x", 0, 7), ("y", 4, 7)], {}, "no field z: its fields are x, y"),
-        ([("x", 0, 7), ("y", 4, 5), ("z", 8, 7)], {}, r"y has the datatype 5: it must be FLOAT32 \(7\) or FLOAT64"),
-        (PLAIN, dict(width=9), "sizes do not fit .*: 2 x 9 points, point_step 12, row_step 24, 48 bytes"),
-        (PLAIN, dict(row_step=12), "rows overlap"),
+        ([("x", 0, 7), ("y", 4, 7)], {}, "no field z"),
+        ([("x", 0, 7), ("y", 4, 5), ("z", 8, 7)], {}, "datatype 5"),
+        (PLAIN, dict(width=9), "sizes"),
+        (PLAIN, dict(row_step=12), "rows"),
     ],
 )
 def test_clouds_that_cannot_be_read_say_why(packed, fields, changes, message):

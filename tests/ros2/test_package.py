@@ -18,13 +18,13 @@ def facts(package):
 @pytest.fixture
 def installed(package, monkeypatch):
     """What setup.py tells setuptools."""
-    calls = {}
+    told = {}
     setuptools = ModuleType("setuptools")
-    setuptools.setup = lambda **what: calls.update(what)
+    setuptools.setup = lambda **what: told.update(what)
     monkeypatch.setitem(sys.modules, "setuptools", setuptools)
     monkeypatch.chdir(package)
     runpy.run_path("setup.py")
-    return calls
+    return told
 
 
 def test_setup_installs_what_ament_looks_for(package, facts, installed):
@@ -43,25 +43,25 @@ def test_setup_installs_what_ament_looks_for(package, facts, installed):
 
 def test_package_xml_names_all_that_is_imported(package, facts):
     named = {depend.text for depend in facts.findall("exec_depend")}
-    actual = set()
+    imported = set()
     for path in package.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Import):
-                actual.update(alias.name.split(".")[0] for alias in node.names)
+                imported.update(alias.name.split(".")[0] for alias in node.names)
             elif isinstance(node, ast.ImportFrom) and not node.level:
-                actual.add(node.module.split(".")[0])
+                imported.add(node.module.split(".")[0])
             elif isinstance(node, ast.Constant) and "/msg/" in str(node.value) and " " not in node.value:
-                actual.add(node.value.split("/")[0])
+                imported.add(node.value.split("/")[0])
     python = {"numpy": "python3-numpy", "scipy": "python3-scipy"}
-    apart = {"glsk_o3d", "rosbags", "setuptools", *sys.stdlib_module_names}
-    assert {python.get(name, name) for name in actual - apart} == named
+    elsewhere = {"glsk_o3d", "rosbags", "setuptools", *sys.stdlib_module_names}
+    assert {python.get(name, name) for name in imported - elsewhere} == named
 
 
 def test_the_launch_file_starts_the_node_with_its_parameters(package, ros, installed, monkeypatch):
     def module(name, **names):
-        created = ModuleType(name)
-        vars(created).update(names)
-        monkeypatch.setitem(sys.modules, name, created)
+        made = ModuleType(name)
+        vars(made).update(names)
+        monkeypatch.setitem(sys.modules, name, made)
 
     def remember(*words, **named):
         return SimpleNamespace(words=words, **named)
