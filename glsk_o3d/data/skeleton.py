@@ -13,8 +13,9 @@ from ..errors import InvalidParameterError, brief
 from ..geometry.vectors import FARTHEST_PLACE
 from ..interop.packages import import_open3d, require
 from ..parameters import shown
-from .graph import OF_VERTICES, Graph, in_order_of_ends
+from .graph import OF_VERTICES, in_order_of_ends
 from .report import Report
+from .space_curve import SpaceCurve
 
 if TYPE_CHECKING:
     import networkx
@@ -38,7 +39,7 @@ UNIT = 1.001  # derived: a unit vector that was written in three digits is one
 
 
 @dataclass(frozen=True, eq=False)
-class Skeleton(Graph):
+class Skeleton(SpaceCurve):
     """A curve skeleton: a graph embedded in space, in the units of the cloud it was made from.
 
     All fields are checked. Arrays without rows mean unknown values and are filled with NaN, or -1 for

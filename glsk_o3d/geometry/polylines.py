@@ -5,10 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from .groups import group_rank
-from .vectors import TINY, Floats, dot, norm
+from .neighbourhoods import plane_axes
+from .vectors import TINY, Floats, dot, norm, unit
 
 ROUNDING = np.finfo(float).eps  # derived: of a number, over itself
 POLYLINE_CHUNK = 2**20  # speed: pairs of a point and an edge at a time: memory stays flat
+TURNED_BACK = 1e-9  # precision: of the sum of two unit vectors that are opposite
 NEAREST_TIE = 1e-9  # derived: of roundings, which must not choose between the edges of a vertex
 
 
@@ -115,3 +117,36 @@ def places_on_edges(x: np.ndarray, edges: np.ndarray, edge: np.ndarray, t: np.nd
     """The places, (n, 3) float array, that `nearest_on_edges` names."""
     start, direction = x[edges[:, 0]], x[edges[:, 1]] - x[edges[:, 0]]
     return start.take(edge, axis=0) + t[:, None] * direction.take(edge, axis=0)
+
+
+def twist_free_frames(places: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """Frames (n, 3, 3) along polylines (n, 3), one after the other, of which row `first` (p,) begins each.
+
+    The columns are the unit tangent and two directions across it. Every frame follows from the one before by the
+    smallest rotation that takes one tangent to the next; a polyline that ends where it began has one tangent there.
+    """
+    begins = np.zeros(len(places), bool)
+    begins[first] = True
+    edge = np.diff(places, axis=0, prepend=places[:1])  # the one that leads to each place
+    edge[begins] = 0
+    edge = unit(edge)
+    onward = np.concatenate([edge[1:], np.zeros((1, 3))])  # what follows the last place of a polyline is zero
+    last = np.append(np.asarray(first)[1:], len(places)) - 1
+    closed = (last - first > 1) & (places[first] == places[last]).all(axis=1)
+    edge[first[closed]], onward[last[closed]] = edge[last[closed]], onward[first[closed]]
+    tangent = edge + onward
+    length = norm(tangent)
+    turns_back = length < TURNED_BACK
+    tangent[turns_back] = np.where(norm(onward[turns_back])[:, None] > 0, onward[turns_back], [0.0, 0.0, 1.0])
+    tangent = unit(tangent)
+    axes = plane_axes(tangent)
+    # the smallest rotation from one tangent to the next takes the first axis of the one along
+    before, after, carried = tangent[:-1], tangent[1:], axes[:-1, :, 0]
+    cosine = np.maximum(1 + dot(before, after), TURNED_BACK)
+    carried = carried - (dot(carried, after) / cosine)[:, None] * (before + after)
+    u, v = np.einsum("ni,nij->jn", carried, axes[1:])
+    turn = np.r_[0, np.where(begins[1:], 0, np.arctan2(v, u))].cumsum()
+    turn -= np.repeat(turn[first], np.diff(np.append(first, len(places))))
+    across, beside = np.moveaxis(axes, 2, 0)
+    cosine, sine = np.cos(turn)[:, None], np.sin(turn)[:, None]
+    return np.stack([tangent, cosine * across + sine * beside, cosine * beside - sine * across], axis=2)
