@@ -74,7 +74,8 @@ NAMES = {
     },
     "editing": {
         "Removal of parts": ("prune", "largest_component", "cut_loops"),
-        "Fewer vertices": ("simplify",),
+        "Other vertices": ("resample", "simplify", "smooth"),
+        "Other coordinates": ("transform",),
         "More or less detail": ("detailed",),
         "Another root": ("reroot",),
     },

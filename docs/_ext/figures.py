@@ -48,6 +48,34 @@ from glsk_o3d.geometry.neighbourhoods import plane_axes
 # ------------------------------------------------------------------------------------------------- pages of the filters
 
 
+def curve():
+    fork = glsk.editing.smooth(glsk.skeletonize(samples.helix(4000).points), length=0.3)
+    rng = np.random.default_rng(0)
+    points = samples.helix(4000).points[rng.choice(4000, 60, replace=False)]
+    points = fork.vertices.mean(axis=0) + 1.15 * (points - fork.vertices.mean(axis=0))
+    figure, axes = panels(["nearest places", "frames", "sections"])
+    places = fork.nearest(points)
+    for axis in axes:
+        graph(axis, fork)
+    dots(axes[0], points, INK, 5)
+    segments(axes[0], points, places.position, INK)
+    rows = fork.branches[0][::8]
+    for column, color in enumerate((RED, BLUE, INK)):
+        ends = fork.vertices[rows] + 0.12 * fork.frames[rows, :, column]
+        segments(axes[1], fork.vertices[rows], ends, color)
+    for arc_length in np.linspace(0.05, 0.95, 12) * fork.length:
+        outline = fork.section(0, float(arc_length)).outline
+        segments(axes[2], outline, np.roll(outline, -1, axis=0), BLUE)
+    same_scale(axes)
+    return figure
+
+
+def segments(axis, starts, ends, color):
+    axis.add_collection(
+        LineCollection(np.stack([view(starts)[:, :2], view(ends)[:, :2]], axis=1), colors=color, linewidths=0.8)
+    )
+
+
 def denoiser():
     rng = np.random.default_rng(1)
     points = samples.y_junction(3000, noise=0.02).points
@@ -325,7 +353,7 @@ def things():
 FIGURES = (
     *(showcase, card_robots, card_trees, card_shapes),
     *(denoiser, contractor, lpr_reducer, connector, refiner, stopping),
-    *(hull, contraction, reduction, mass, centring, loop_test, limits, things),
+    *(hull, contraction, reduction, mass, centring, loop_test, limits, things, curve),
 )
 
 

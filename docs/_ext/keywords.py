@@ -16,6 +16,10 @@ KEYWORDS = {
     ),
     "docs/coming_from": "matlab, cloudcontr, migration, coming from, pc-skeletor, skeletor, cgal",
     "docs/open3d": "open3d, annotate, attributes, colours, colors, tubes, tensor, downsample, point reduction",
+    "docs/curve": (
+        "nearest, distance, arc length, path, geodesic, tangent, frame, curvature, section, cross-section, "
+        "resample, smooth, transform, scale"
+    ),
     "docs/branches": (
         "branch, branches, segmentation, segment, label, labels, length, edit, editing, detail, prune, "
         "simplify, reroot, cut loops, convert"

@@ -18,7 +18,7 @@ from ..parameters import check_number, shown
 from .derived import derived
 from .graph import Graph
 
-NEAREST_PIECES = (
+CLOSEST_PIECES = (
     8  # speed: pieces of the curve that are looked at first; more where these may not hold the nearest place
 )
 SECTION_THICKNESS = 0.25  # fitted: of the slab whose points show a section, either way, over the radius
@@ -350,7 +350,7 @@ def _nearest(vertices: np.ndarray, edges: np.ndarray, points: np.ndarray) -> tup
     part = (np.arange(len(of_piece)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[of_piece]
     reach = (length / count).max() / 2
     tree = cKDTree(places_on_edges(vertices, edges, of_piece, part))
-    edge, share, rows, k = np.zeros(len(points), int), np.zeros(len(points)), np.arange(len(points)), NEAREST_PIECES
+    edge, share, rows, k = np.zeros(len(points), int), np.zeros(len(points)), np.arange(len(points)), CLOSEST_PIECES
     while len(rows):
         k = min(k, len(of_piece))
         distance, piece = (values.reshape(len(rows), k) for values in tree.query(points[rows], k))
