@@ -14,6 +14,7 @@ from .data.decisions import Decision, Supported
 from .data.points import Points
 from .data.report import IterationRecord, Report
 from .data.skeleton import Skeleton
+from .data.verdict import Reason, Verdict
 from .errors import (
     BatchError,
     DisplayError,
@@ -79,6 +80,7 @@ __all__ = [
     "Pipeline",
     "PluginWarning",
     "Points",
+    "Reason",
     "RecipeError",
     "Refiner",
     "Report",
@@ -92,6 +94,7 @@ __all__ = [
     "Supported",
     "Thinner",
     "Tracer",
+    "Verdict",
     "analysis",
     "annotate",
     "annotate_file",

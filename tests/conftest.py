@@ -24,6 +24,7 @@ from typer.testing import CliRunner
 from glsk_o3d import save_skeleton
 from glsk_o3d.data.report import IterationRecord, Report
 from glsk_o3d.data.skeleton import Skeleton
+from glsk_o3d.data.verdict import Reason
 from glsk_o3d.filters.ring_builder import RingBuilder
 from glsk_o3d.recipes.plugins import forget_plugins
 
@@ -189,7 +190,9 @@ def build(vertices, edges, n_points=7, seed=0):
         IterationRecord(**{f.name: next(wholes if f.type in (int, "int") else floats) for f in fields(IterationRecord)})
         for _ in range(2)
     )
-    report = Report(n_input=n_points, seconds={"RingBuilder": 1 / 7}, iterations=records, warnings=("häßlich",))
+    report = Report(
+        n_input=n_points, seconds={"RingBuilder": 1 / 7}, iterations=records, reasons=(Reason("other", "häßlich"),)
+    )
     confidence = np.where(np.arange(m) == 1, np.nan, rng.random(m) / 3)
     return Skeleton(vertices, edges, rng.random(m) / 3, owners, points, normals, report, confidence)
 

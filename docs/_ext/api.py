@@ -34,7 +34,7 @@ NAMES = {
     "skeletons": {
         "One call": ("skeletonize", "Skeleton"),
         "Which parts depend on single points": ("support", "Supported"),
-        "The record of a run": ("Report", "IterationRecord", "Decision"),
+        "The record of a run": ("Report", "IterationRecord", "Decision", "Reason", "Verdict"),
         "Fewer points, without a skeleton": ("remove_redundant_points",),
     },
     "filters": {

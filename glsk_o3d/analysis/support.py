@@ -162,7 +162,10 @@ def _supported(skeleton: Skeleton, others: list[Skeleton]) -> Skeleton:
     if same <= WORTH_A_WARNING * len(curves):
         weak = f", above all {report.unsupported[0]}: look there" if report.unsupported else ""
         others = f"{len(curves) - same} of {len(curves)} samples of the cloud"
-        report = report.with_warning(f"uncertain: {others} have a skeleton with another graph{weak}")
+        text, place = f"uncertain: {others} have a skeleton with another graph{weak}", ()
+        if report.unsupported:
+            place = report.unsupported[0].place
+        report = report.with_reason("other samples", text, place, draws=len(curves), agreeing=same)
         warn(report.warnings[-1:])
     return replace(skeleton, support=support, report=report)
 

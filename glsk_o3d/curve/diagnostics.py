@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data.decisions import coordinates
+from ..data.verdict import Reason
 from ..geometry.groups import component_labels, group_median, group_sum
 from ..geometry.numbers import precision, warning
 from ..geometry.vectors import dot, norm
@@ -27,22 +28,22 @@ class WarningNumbers:
 WARN = WarningNumbers()
 
 
-REASONS = ("sheet-like", "sphere-like", "no edges", "uncertain topology", "weakly supported")
-"""What the messages of `diagnose` begin with."""
+DIAGNOSES = ("sheet", "sphere", "no edges", "close call", "weak region")
+"""The codes of the reasons that `diagnose` gives."""
 
 
 def measured(curve: Curve) -> Curve:
-    """A finished curve with its sections, and with the reasons not to trust it among the warnings of its report.
+    """A finished curve with its sections, and with the reasons not to trust it.
 
-    They take the place of those of before, and follow what other filters warned of.
+    They take the place of those of before, and follow what other filters said.
     """
     sections = curve.sections
     curve = curve.changed(half_width=sections.half_width, half_thickness=sections.half_thickness)
-    others = [message for message in curve.report.warnings if message.partition(":")[0] not in REASONS]
-    return curve.with_facts(warnings=(*others, *diagnose(curve)))
+    others = [reason for reason in curve.report.reasons if reason.code not in DIAGNOSES]
+    return curve.with_facts(reasons=(*others, *diagnose(curve)))
 
 
-def diagnose(curve: Curve) -> list[str]:
+def diagnose(curve: Curve) -> list[Reason]:
     """Reasons not to trust a curve: the cloud is sheet-like, sphere-like, or does not say where much of the axis is.
 
     Sheet-like: the normals around a vertex have one direction, and it has little confidence, unlike a blade, which has
@@ -51,72 +52,93 @@ def diagnose(curve: Curve) -> list[str]:
     cloud that is neither, the parts with little confidence are named, and the least certain question about loops, air
     and gaps. No edges at all are a reason, too.
     """
-    cloud = curve.cloud
-    if len(cloud.rows) == 0:
+    if len(curve.cloud.rows) == 0:
         return []
-    vertex, normals, count = cloud.vertex, cloud.normals, cloud.count
-    along = np.einsum("ni,nj->nij", normals, normals)
+    reason = _sheet(curve) or _ball(curve) or _stubs(curve)
+    if reason:
+        return [reason]
+    if len(curve.edges) == 0:
+        text = "no edges: every part became one vertex; is Connector.radius larger than the parts are long?"
+        return [Reason("no edges", text)]
+    return _weak_region(curve) + _close_calls(curve)
 
-    part, n = curve.component_of_vertex, curve.n_components
-    component = part[vertex]
-    size = np.bincount(component, minlength=n)[:, None]
-    one_way = np.linalg.eigvalsh(group_sum(along, vertex, len(count)))[:, 2] > CURVE.sheet * np.maximum(count, 1)
+
+def _sheet(curve: Curve) -> Reason | None:
+    """Most of the surface faces one direction."""
+    cloud, part, n = curve.cloud, curve.component_of_vertex, curve.n_components
+    along = np.einsum("ni,nj->nij", cloud.normals, cloud.normals)
+    spread = np.linalg.eigvalsh(group_sum(along, cloud.vertex, len(part)))
+    one_way = spread[:, 2] > CURVE.sheet * np.maximum(cloud.count, 1)
     length = np.bincount(part[curve.edges[:, 0]], curve.edge_lengths, n)
-    stub = length < CURVE.stub * group_median(curve.half_width[vertex], component, n)
-    sheet = count[one_way & (~(curve.confidence >= WARN.low_confidence) | stub[part])].sum() / len(vertex)
-    if sheet > CURVE.majority:
-        return [
-            f"sheet-like: around {sheet:.0%} of the points the surface faces one direction only, "
-            "so a curve skeleton has little meaning; if that is a table or a floor under an object, remove it first, "
-            "with Open3D's segment_plane or read_cloud(..., where='z > ...')"
-        ]
-
-    points = cloud.points - curve.vertices[0]
-    # of every normal line I - n n^T, which takes away what is along it
-    weight = (size[:, :, None] + WARN.regular * np.maximum(size, 1)[:, :, None]) * np.eye(3) - group_sum(
-        along, component, n
+    stub = length < CURVE.stub * group_median(curve.half_width[cloud.vertex], part[cloud.vertex], n)
+    flat = one_way & (~(curve.confidence >= WARN.low_confidence) | stub[part])
+    share = float(cloud.count[flat].sum() / len(cloud.vertex))
+    text = (
+        f"sheet-like: around {share:.0%} of the points the surface faces one direction only, "
+        "so a curve skeleton has little meaning; if that is a table or a floor under an object, remove it first, "
+        "with Open3D's segment_plane or read_cloud(..., where='z > ...')"
     )
-    height = dot(normals, points)[:, None]
-    meet = np.linalg.solve(weight, group_sum(points - height * normals, component, n)[:, :, None])[:, :, 0]
+    return Reason("sheet", text, numbers=dict(share=share)) if share > CURVE.majority else None
+
+
+def _ball(curve: Curve) -> Reason | None:
+    """The normal lines of components with most of the points meet in one point."""
+    cloud, n = curve.cloud, curve.n_components
+    component = curve.component_of_vertex[cloud.vertex]
+    size, points = np.bincount(component, minlength=n)[:, None], cloud.points - curve.vertices[0]
+    along = np.einsum("ni,nj->nij", cloud.normals, cloud.normals)
+    # of every normal line I - n n^T, which takes away what is along it
+    regular = WARN.regular * np.maximum(size, 1)
+    weight = (size + regular)[:, :, None] * np.eye(3) - group_sum(along, component, n)
+    height = dot(cloud.normals, points)[:, None]
+    meet = np.linalg.solve(weight, group_sum(points - height * cloud.normals, component, n)[:, :, None])[:, :, 0]
     offset = points - meet[component]
     distance = dot(offset, offset)
-    miss = distance - dot(normals, offset) ** 2
+    miss = distance - dot(cloud.normals, offset) ** 2
     spread = group_sum(np.column_stack([miss, distance]), component, n)
     ball = spread[:, 0] < WARN.ball_spread**2 * spread[:, 1]
-    share = size[ball].sum() / len(vertex)
-    if share > CURVE.majority:
-        return [
-            f"sphere-like: the normals of parts with {share:.0%} of the points meet in one point, "
-            "so no curve skeleton is meaningful there"
-        ]
-    spread = group_sum(np.einsum("ni,nj->nij", points, points), component, n) / np.maximum(size, 1)[:, :, None]
+    share = float(size[ball].sum() / len(cloud.vertex))
+    text = (
+        f"sphere-like: the normals of parts with {share:.0%} of the points meet in one point, "
+        "so no curve skeleton is meaningful there"
+    )
+    return Reason("sphere", text, numbers=dict(share=share)) if share > CURVE.majority else None
+
+
+def _stubs(curve: Curve) -> Reason | None:
+    """Components with most of the points are hardly longer than thick."""
+    cloud, n = curve.cloud, curve.n_components
+    component = curve.component_of_vertex[cloud.vertex]
+    size, points = np.bincount(component, minlength=n)[:, None], cloud.points - curve.vertices[0]
     mean = group_sum(points, component, n) / np.maximum(size, 1)
-    length = np.sqrt(12 * np.maximum(np.linalg.eigvalsh(spread - mean[:, :, None] * mean[:, None])[:, 2], 0))
+    products = np.einsum("ni,nj->nij", points, points)
+    spread = group_sum(products, component, n) / np.maximum(size, 1)[:, :, None] - mean[:, :, None] * mean[:, None]
+    length = np.sqrt(12 * np.maximum(np.linalg.eigvalsh(spread)[:, 2], 0))
     reach = group_median(norm(cloud.offset), component, n)
-    share = size[length < CURVE.stub * reach].sum() / len(vertex)
-    if share > CURVE.majority:
-        return [
-            f"sphere-like: parts with {share:.0%} of the points are hardly longer than thick, "
-            "so no curve skeleton is meaningful there"
-        ]
-    if len(curve.edges) == 0:
-        return ["no edges: every part became one vertex; is Connector.radius larger than the parts are long?"]
-    return _weak_region(curve, count) + _close_calls(curve)
+    share = float(size[length < CURVE.stub * reach].sum() / len(cloud.vertex))
+    text = (
+        f"sphere-like: parts with {share:.0%} of the points are hardly longer than thick, "
+        "so no curve skeleton is meaningful there"
+    )
+    return Reason("sphere", text, numbers=dict(share=share)) if share > CURVE.majority else None
 
 
-def _close_calls(curve: Curve) -> list[str]:
+def _close_calls(curve: Curve) -> list[Reason]:
     close = [decision for decision in curve.report.uncertain if decision.about != "limb"]
     if not close:
         return []
     asked = sum(decision.about != "limb" for decision in curve.report.decisions)
-    return [
+    text = (
         f"uncertain topology: {len(close)} of {asked} questions about loops, air and gaps were close calls, above all "
         f"whether {close[0].question} (probability {close[0].probability:.2f}): look there; "
         f"if '{close[0].outcome}' is wrong, set {close[0].otherwise}"
-    ]
+    )
+    numbers = dict(close=len(close), asked=asked, probability=close[0].probability)
+    return [Reason("close call", text, close[0].place, numbers)]
 
 
-def _weak_region(curve: Curve, count: np.ndarray) -> list[str]:
+def _weak_region(curve: Curve) -> list[Reason]:
+    count = curve.cloud.count
     weak = curve.confidence < WARN.low_confidence
     share = count[weak].sum() / count.sum()
     if share <= WARN.low_share:
@@ -126,8 +148,10 @@ def _weak_region(curve: Curve, count: np.ndarray) -> list[str]:
     most = np.argmax(np.bincount(label[weak], count[weak], minlength=len(weak)))
     region = curve.vertices[weak & (label == most)]
     middle = region.mean(axis=0)
-    reach, place = norm(region - middle).max(), coordinates(middle)
-    return [
+    x, y, z = middle.tolist()
+    reach, place = float(norm(region - middle).max()), coordinates(middle)
+    text = (
         f"weakly supported: around {share:.0%} of the points, above all within {reach:.3g} of ({place}), the points do "
         "not agree on an axis: they are too sparse or noisy, or their parts are no tubes, such as a table under it"
-    ]
+    )
+    return [Reason("weak region", text, (x, y, z), dict(share=float(share), reach=reach))]

@@ -16,6 +16,7 @@ from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 from ..errors import SkeletonWarning
 from .decisions import WORDS, Decision, Place, Supported
 from .derived import Changeable
+from .verdict import CODES, Reason
 
 Flow = TypeVar("Flow", bound="Reported")
 
@@ -160,7 +161,9 @@ class Report:
     iterations : tuple of IterationRecord
     converged, stop_reason : bool, str
         Whether the stopping rule ended the contraction, and why it ended.
-    warnings, versions : tuple of str, dict of str to str
+    reasons : tuple of Reason
+        What a user should know about the skeleton.
+    versions : dict of str to str
 
     Examples
     --------
@@ -196,7 +199,7 @@ class Report:
     iterations: tuple[IterationRecord, ...] = ()
     converged: bool = False
     stop_reason: str = NOT_CONTRACTED
-    warnings: tuple[str, ...] = ()
+    reasons: tuple[Reason, ...] = ()
     versions: dict[str, str] = field(default_factory=_versions)
 
     def __str__(self) -> str:
@@ -223,9 +226,18 @@ class Report:
             *(("warning", part) for part in self.warnings),
         ]
 
-    def with_warning(self, message: str) -> Report:
-        """This report with one more warning, to be issued at the end."""
-        return dataclasses.replace(self, warnings=(*self.warnings, message))
+    def with_reason(self, code: str, text: str, place: tuple[float, ...] = (), **numbers: float) -> Report:
+        """This report with one more reason; its text is issued as a warning at the end."""
+        return dataclasses.replace(self, reasons=(*self.reasons, Reason(code, text, place, numbers)))
+
+    def with_warning(self, text: str) -> Report:
+        """This report with one more reason that has no code of its own."""
+        return self.with_reason("other", text)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The texts of the reasons."""
+        return tuple(map(str, self.reasons))
 
     @property
     def is_sampled(self) -> bool:
@@ -256,7 +268,10 @@ class Report:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Report:
         """Inverse of `to_dict`; unknown entries of later versions are ignored."""
-        report: Report = _read(data, cls)
+        earlier = [dict(code="other", text=text) for text in data.get("warnings", ())]  # of version 0.1.0
+        report: Report = _read({"reasons": earlier, **data}, cls)
+        if not all(reason.code in CODES for reason in report.reasons):
+            raise ValueError("a reason in its report has an unknown code")
         if not all(decision.about in WORDS for decision in report.decisions):
             raise ValueError("a decision in its report is about an unknown question")
         if not all(decision.is_possible for decision in report.decisions):

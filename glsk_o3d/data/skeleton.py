@@ -13,9 +13,11 @@ from ..errors import InvalidParameterError, brief
 from ..geometry.vectors import FARTHEST_PLACE
 from ..interop.packages import import_open3d, require
 from ..parameters import shown
+from .derived import derived
 from .graph import OF_VERTICES, in_order_of_ends
 from .report import Report
 from .space_curve import SpaceCurve
+from .verdict import Verdict, graph_score, verdict_of
 
 if TYPE_CHECKING:
     import networkx
@@ -119,6 +121,21 @@ class Skeleton(SpaceCurve):
             f"Skeleton({len(self.vertices)} vertices, {len(self.edges)} edges, {self.n_components} components, "
             f"{self.n_loops} loops, {len(self.leaves)} leaves, {len(self.junctions)} junctions)"
         )
+
+    @derived("report", "confidence")
+    def score(self) -> float:
+        """Probability that the graph is right, 0 to 1: components, loops and all ends. NaN if unknown.
+
+        By how certain the decisions about the topology are, and by the confidence of the vertices. Of random shapes
+        with a score about s, a share of about s is right; where narrow holes or stout limbs are lost before anything is
+        asked, it is too high.
+        """
+        return graph_score(self.report.decisions, self.confidence)
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether to rely on it, by its score and by ``report.reasons``; doubtful if that is unknown."""
+        return verdict_of(self.score, self.report.reasons)
 
     @property
     def whole(self) -> Skeleton:

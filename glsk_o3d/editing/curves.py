@@ -119,6 +119,9 @@ def transform(skeleton: Skeleton, matrix: Any) -> Skeleton:
         x, y, z = moved(of)[0].tolist()
         return x, y, z
 
+    def moved_or_none(of: tuple[float, ...]) -> tuple[float, ...]:
+        return tuple(moved(of)[0].tolist()) if of else ()
+
     decisions = tuple(
         replace(
             decision,
@@ -132,8 +135,9 @@ def transform(skeleton: Skeleton, matrix: Any) -> Skeleton:
         report,
         decisions=decisions,
         support=tuple(replace(each, place=place(each.place)) for each in report.support),
+        reasons=tuple(replace(each, place=moved_or_none(each.place)) for each in report.reasons),
         joined=tuple((place(a), place(b)) for a, b in report.joined),
-        root=tuple(moved(report.root)[0].tolist()) if report.root else (),
+        root=moved_or_none(report.root),
     )
     lengths = ("radii", "half_width", "half_thickness")
     return skeleton.changed(

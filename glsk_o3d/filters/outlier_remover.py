@@ -76,7 +76,7 @@ class OutlierRemover(Filter[Points, Points]):
         mixed, doubtful = mixed_pixels(points, distance, factor)
         remaining, neighbours = inliers(cloud, weight, neighbours, distance, mixed, factor, MIN_POINTS)
         if doubtful:
-            points = points.with_report(points.report.with_warning(MIXED_OR_TWIGS))
+            points = points.with_report(points.report.with_reason("mixed pixels", MIXED_OR_TWIGS))
         if len(remaining) == len(points):
             return points
         gone = np.ones(len(points), bool)

@@ -61,7 +61,7 @@ class Sampler(Filter[Cloud, Points]):
         if isinstance(self.sample, str) or points.report.n_by_area:
             return points
         warning = f"Sampler.sample = {self.sample}: the cloud has no triangles with an area: its points are taken"
-        return points.with_report(points.report.with_warning(warning))
+        return points.with_report(points.report.with_reason("option", warning))
 
     def sample_size(self, n: int) -> int:
         """Size of the sample of n points if n is more than twice as large."""

@@ -78,7 +78,7 @@ class Thinner(Filter[Points, Points]):
         report = points.report
         if report.is_sampled and self.thin_to != "auto" and self.thin_to > report.n_sampled:
             warning = f"Thinner.thin_to = {self.thin_to}: the Sampler left {report.n_sampled} points: set Sampler.size"
-            points = points.with_report(report.with_warning(warning))
+            points = points.with_report(report.with_reason("option", warning))
         n = max(report.n_input - report.n_dropped, report.n_by_area)
         most = default_size(n) if self.thin_to == "auto" else self.thin_to
         if most < len(points):

@@ -10,6 +10,7 @@ import pytest
 
 import glsk_o3d as glsk
 from glsk_o3d import pipelines, samples
+from glsk_o3d.data.verdict import Reason
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +43,7 @@ def test_a_printed_report_has_the_main_facts_in_twelve_lines():
         n_contracted=500,
         decisions=(glsk.Decision("loop", (0.0, 0.5, -2.0), 0.45, changed=True),),
         seconds={"Sampler": 0.25, "Refiner": 0.5},
-        warnings=("sheet-like: a < b",),
+        reasons=(Reason("sheet", "sheet-like: a < b"),),
     )
     lines = str(report).splitlines()
     assert all(word in str(report) for word in ("900 input", "500 contracted", "0.45", "Refiner 0.50", "a < b"))

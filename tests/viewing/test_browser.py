@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import glsk_o3d as glsk
-from glsk_o3d import Skeleton
+from glsk_o3d import Reason, Skeleton
 
 HOSTILE = "</title></script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&amp;{{data}}"
 SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")  # WebGL without a GPU
@@ -53,7 +53,8 @@ def test_the_view_is_drawn_in_webgl(run, look):
 
 
 def test_texts_are_texts(run, look):
-    texts = dict(warnings=(HOSTILE,), stop_reason=HOSTILE, recipe={HOSTILE: HOSTILE}, versions={HOSTILE: HOSTILE})
+    reasons = (Reason("other", HOSTILE),)
+    texts = dict(reasons=reasons, stop_reason=HOSTILE, recipe={HOSTILE: HOSTILE}, versions={HOSTILE: HOSTILE})
     page = look(dataclasses.replace(run, report=dataclasses.replace(run.report, **texts)), title=HOSTILE)
     assert page.title() == HOSTILE
     for place in ("h1", ".warnings li", ".run td >> nth=-1"):

@@ -11,6 +11,7 @@ import glsk_o3d as glsk
 from glsk_o3d import save_report, to_line_set
 from glsk_o3d.data.decisions import Decision, Supported
 from glsk_o3d.data.report import IterationRecord, Report
+from glsk_o3d.data.verdict import Reason
 from glsk_o3d.samples import torus
 from glsk_o3d.viewing import page
 
@@ -67,7 +68,7 @@ HOSTILE = "<meta http-equiv=refresh content='//x'>\"'--><svg/onload=x>&lt;{diges
 @pytest.mark.parametrize("ending", [".json", ".npz"])
 def test_no_text_of_a_file_becomes_part_of_the_page(tmp_path, tree, ending):
     place = (0.0, 0.0, 0.0)
-    texts = dict(stop_reason=HOSTILE, stages=(HOSTILE,), warnings=(HOSTILE,), recipe={HOSTILE: HOSTILE})
+    texts = dict(stop_reason=HOSTILE, stages=(HOSTILE,), reasons=(Reason("other", HOSTILE),), recipe={HOSTILE: HOSTILE})
     numbers = dict(n_draws=8, support=(Supported(HOSTILE, place, present=True, share=0.25),), seconds={HOSTILE: 1.0})
     report = dataclasses.replace(judged((0.5, True)), **texts, **numbers, versions={HOSTILE: HOSTILE})
     glsk.save_skeleton(dataclasses.replace(tree, report=report), tmp_path / f"s{ending}")

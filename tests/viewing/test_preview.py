@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from glsk_o3d import Skeleton
+from glsk_o3d import Reason, Skeleton
 from glsk_o3d.data.decisions import Supported
 from glsk_o3d.data.report import Report
 from glsk_o3d.errors import FileFormatError
@@ -107,7 +107,8 @@ def test_what_samples_disagree_with_is_marked(tree, tmp_path):
 def test_words_stay_in_the_picture(title, warnings):
     """Also in that of a tall object, which is narrow: titles, counts and warnings are broken to its width."""
     tall = Skeleton([[0, 0, 0], [0.1, 0, 50], [0, 0, 100]], [(0, 1), (1, 2)], np.ones(3), (), (), ())
-    figure = preview.draw(dataclasses.replace(tall, report=Report(n_input=123_456_789, warnings=warnings)), title)
+    report = Report(n_input=123_456_789, reasons=tuple(Reason("other", text) for text in warnings))
+    figure = preview.draw(dataclasses.replace(tall, report=report), title)
     figure.canvas.draw()
     width, height = figure.get_size_inches() * figure.dpi
     boxes = [text.get_window_extent() for text in (figure._suptitle, figure._supxlabel)]

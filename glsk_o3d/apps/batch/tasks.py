@@ -18,6 +18,7 @@ from ... import __version__
 from ...analysis.summary import summary
 from ...data.report import Report
 from ...data.skeleton import Skeleton
+from ...data.verdict import Reason
 from ...errors import GlskError, InvalidCloudError, in_words
 from ...io.scans import read_scan
 from ...io.skeletons import read_skeleton, save_skeleton
@@ -95,7 +96,7 @@ def _of_tile(task: Task) -> Skeleton:
     try:
         skeleton: Skeleton = from_recipe(task.recipe)(points)
     except InvalidCloudError as error:
-        report = Report(n_input=len(points)).with_warning(f"no skeleton in this tile: {error}")
+        report = Report(n_input=len(points)).with_reason("no edges", f"no skeleton in this tile: {error}")
         return Skeleton(none, np.empty((0, 2)), np.empty(0), np.empty(0), none, none, report)
     return replace(skeleton, points=none, normals=none, vertex_of_point=np.empty(0))
 
@@ -112,7 +113,7 @@ def _joined(task: Task, row: Row) -> Skeleton:
     if bare:
         why = f"of {sum(bare)} points: the ledger says why"
         messages.insert(0, f"{len(bare)} of {len(files)} tiles have no skeleton, {why}")
-    return replace(skeleton, report=replace(report, warnings=tuple(messages)))
+    return replace(skeleton, report=replace(report, reasons=tuple(Reason("tiles", text) for text in messages)))
 
 
 def in_one_line(error: BaseException) -> str:
