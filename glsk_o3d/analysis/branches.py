@@ -13,7 +13,7 @@ from ..geometry.cycles import edges_on_cycles
 from ..geometry.polylines import arc_lengths, place_at, relative_distance
 from ..geometry.vectors import Floats, Ints, norm
 from .rows import Rows
-from .segmentation import branch_of_edge, branch_of_point
+from .segmentation import branch_of_point
 
 HEADING_LENGTH = 4.0  # fitted: radii of a junction over which a branch has its direction; where nearer, parts blend
 HEADING_PLACES = 65  # precision: along the half of a branch, each inside or outside the other branches
@@ -267,7 +267,7 @@ def _mean(values: np.ndarray, weights: np.ndarray) -> Any:
 def _kinds(skeleton: Skeleton, paths: list[np.ndarray]) -> np.ndarray:
     """The kind of every path, see `BranchTable`."""
     on_loop = np.zeros(len(paths), bool)
-    on_loop[branch_of_edge(skeleton)] = edges_on_cycles(len(skeleton.vertices), skeleton.edges)
+    on_loop[skeleton.branch_of_edge] = edges_on_cycles(len(skeleton.vertices), skeleton.edges)
     degree = skeleton.degree[[path[[0, -1]] for path in paths]]
     conditions = [(degree == 0).all(axis=1), on_loop, (degree == 1).any(axis=1)]
     return np.select(conditions, ["isolated", "loop", "tip"], "inner")

@@ -12,7 +12,6 @@ from ..data.skeleton import Skeleton
 from ..geometry.groups import group_rank
 from ..geometry.polylines import arc_lengths, incident_edges, nearest_on_edges, place_at
 from ..geometry.vectors import TINY, norm
-from .segmentation import branch_of_edge
 
 MOST_WEIGHTS = 4  # published: glTF 2.0, 3.7.3.3, joints of a vertex in one set
 BLEND = 1.5  # fitted: radii beyond its end at which a bone ceases to move a tube; with 1 a bent elbow has a dent
@@ -166,6 +165,6 @@ def bone_before(forest: Skeleton) -> np.ndarray:
 
 def bone_names(forest: Skeleton) -> list[str]:
     """Names of the bones, of their branch and their number on it."""
-    branch = branch_of_edge(forest)
+    branch = forest.branch_of_edge
     numbers = group_rank(branch, len(forest.branches)).tolist()
     return [f"branch_{label}.{number:03d}" for label, number in zip(branch.tolist(), numbers, strict=True)]

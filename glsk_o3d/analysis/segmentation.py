@@ -86,20 +86,10 @@ def _nearest_vertex(skeleton: Skeleton, points: np.ndarray) -> Any:
     return np.concatenate([ends, detached])[cKDTree(places).query(points)[1]]
 
 
-def branch_of_edge(skeleton: Skeleton) -> np.ndarray:
-    """The position in `Skeleton.branches` of every edge, (E,) int array."""
-    m, none = len(skeleton.vertices), np.empty((0, 2), int)
-    steps = [np.column_stack([path[:-1], path[1:]]) for path in skeleton.branches]
-    keys, edge_keys = (np.sort(pairs, axis=1) @ [m, 1] for pairs in (np.concatenate([*steps, none]), skeleton.edges))
-    branch = np.empty(len(edge_keys), int)
-    branch[np.argsort(edge_keys)] = np.repeat(np.arange(len(steps)), list(map(len, steps)))[np.argsort(keys)]
-    return branch
-
-
 def branch_of_vertex(skeleton: Skeleton) -> np.ndarray:
     """The row of the branch table of every vertex, (M,) int array; -1 for junctions."""
     branch = np.full(len(skeleton.vertices), -1)
-    branch[skeleton.edges] = branch_of_edge(skeleton)[:, None]
+    branch[skeleton.edges] = skeleton.branch_of_edge[:, None]
     branch[skeleton.junctions] = -1
     detached = skeleton.degree == 0
     branch[detached] = len(skeleton.branches) + np.arange(detached.sum())
@@ -110,7 +100,7 @@ def branch_of_vertex(skeleton: Skeleton) -> np.ndarray:
 def branch_of_point(skeleton: Skeleton, points: np.ndarray, vertex: np.ndarray) -> np.ndarray:
     """`segment` for points, (N, 3) float array, whose vertices are known, (N,) int array: (N,) int64 array."""
     label: np.ndarray = np.append(branch_of_vertex(skeleton), -1)[vertex]
-    edge_branch, members = branch_of_edge(skeleton), Members(vertex, len(skeleton.vertices))
+    edge_branch, members = skeleton.branch_of_edge, Members(vertex, len(skeleton.vertices))
     for junction in np.intersect1d(skeleton.junctions, vertex):
         rows = members.of(np.array([junction]))
         around = (skeleton.edges == junction).any(axis=1)

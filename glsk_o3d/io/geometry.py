@@ -5,11 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.segmentation import branch_of_edge
 from ..data.skeleton import Skeleton, check_skeleton
 from ..errors import InvalidParameterError
-from ..geometry.neighbourhoods import plane_axes
-from ..geometry.vectors import TINY
+from ..geometry.polylines import twist_free_frames
 from ..interop.packages import import_open3d
 from ..parameters import check_number
 from .colors import ColorChoice, shades
@@ -42,7 +40,7 @@ def to_line_set(skeleton: Skeleton, color: ColorChoice = "branch") -> Any:
     """
     check_skeleton(skeleton)
     lines = skeleton.to_line_set()
-    colors = shades(skeleton, color, branch_of_edge(skeleton), skeleton.edges)
+    colors = shades(skeleton, color, skeleton.branch_of_edge, skeleton.edges)
     lines.colors = import_open3d().utility.Vector3dVector(np.ascontiguousarray(colors).reshape(-1, 3))
     return lines
 
@@ -114,8 +112,8 @@ def sweep(
     first, last = np.zeros(len(flat), bool), np.zeros(len(flat), bool)
     first[stop - size], last[stop - 1] = True, True
     centre, radius = vertices[flat], radii[flat]
-    tangent, turn = _frames(centre, first)
-    axes = plane_axes(tangent)
+    frames = twist_free_frames(centre, np.flatnonzero(first))
+    tangent, axes = frames[:, :, 0], frames[:, :, 1:]
 
     caps = max(2, sides // 4)  # circles from a half ball's equator to its pole
     before, after = (caps - 1) * first, (caps - 1) * last
@@ -123,8 +121,8 @@ def sweep(
     row = np.repeat(np.arange(len(flat)), count)
     step = np.arange(len(row)) - np.repeat(np.cumsum(count) - count + before, count)
     latitude = step * np.pi / 2 / caps
-    angle = turn[row, None] + np.arange(sides) * 2 * np.pi / sides
-    across = np.einsum("rij,jrs->rsi", axes[row], np.stack([np.cos(angle), np.sin(angle)]))
+    angle = np.arange(sides) * 2 * np.pi / sides
+    across = np.einsum("rij,js->rsi", axes[row], np.stack([np.cos(angle), np.sin(angle)]))
     middle = centre[row] + (radius[row] * np.sin(latitude))[:, None] * tangent[row]
     circles = middle[:, None] + (radius[row] * np.cos(latitude))[:, None, None] * across
     poles = [centre[end] + sign * radius[end, None] * tangent[end] for end, sign in ((first, -1), (last, 1))]
@@ -140,21 +138,3 @@ def sweep(
     faces = [(a, b, d), (a, d, c), (onward[opened], corner[opened], south), (corner[closed], onward[closed], north)]
     triangles = np.concatenate([np.stack(np.broadcast_arrays(*face), axis=-1).reshape(-1, 3) for face in faces])
     return points, triangles, np.concatenate([np.repeat(row, sides), np.flatnonzero(first), np.flatnonzero(last)])
-
-
-def _frames(centre: np.ndarray, first: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit tangents of polylines one after the other, and the angles by which `plane_axes` of them do not twist."""
-    edge = np.diff(centre, axis=0, prepend=centre[:1])  # the one that leads to each point
-    edge[first] = 0
-    edge /= np.maximum(np.linalg.norm(edge, axis=1, keepdims=True), TINY)
-    tangent = edge + np.concatenate([edge[1:], np.zeros((1, 3))])  # what follows a path's last point is another's first
-    length = np.linalg.norm(tangent, axis=1, keepdims=True)
-    tangent = np.where(length > 1e-9, tangent / np.maximum(length, TINY), [0.0, 0.0, 1.0])
-    axes = plane_axes(tangent)
-    # the smallest rotation from one tangent to the next takes the one's first axis along
-    before, after, carried = tangent[:-1], tangent[1:], axes[:-1, :, 0]
-    dot = np.maximum(1 + (before * after).sum(axis=1), 1e-9)
-    carried = carried - ((carried * after).sum(axis=1) / dot)[:, None] * (before + after)
-    u, v = np.einsum("ni,nij->jn", carried, axes[1:])
-    turn = np.r_[0, np.where(first[1:], 0, np.arctan2(v, u))].cumsum()
-    return tangent, turn

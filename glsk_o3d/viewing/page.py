@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.segmentation import branch_of_edge
 from ..analysis.summary import ITERATION_COLUMNS, iteration_rows
 from ..data.decisions import coordinates
 from ..data.report import Markup, Report, markup
@@ -130,7 +129,7 @@ def _curves(skeleton: Skeleton) -> tuple[np.ndarray, list[dict[str, Any]]]:
     """Places along the edges, NaN between them, and how they are drawn: once for each quantity that has colours."""
     detached = np.flatnonzero(skeleton.degree == 0)  # drawn as edges without a length
     edges = np.concatenate([skeleton.edges, np.column_stack([detached, detached])])
-    branch = np.concatenate([branch_of_edge(skeleton), len(skeleton.branches) + np.arange(len(detached))])
+    branch = np.concatenate([skeleton.branch_of_edge, len(skeleton.branches) + np.arange(len(detached))])
     vertex = np.column_stack([edges, edges[:, 1]]).ravel()
     places = skeleton.vertices[vertex]
     places[2::3] = np.nan

@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.segmentation import branch_of_edge
 from ..data.skeleton import Skeleton
 from ..errors import InvalidParameterError
 from ..interop.clouds import cloud_points
@@ -94,7 +93,7 @@ def plot_skeleton(
     axes.computed_zorder = False
     axes.scatter(*points[drawn].T, s=1.5, c=paint, linewidths=0, depthshade=False, clip_on=False, zorder=1)
     if len(skeleton.edges):
-        colors = shades(skeleton, color, branch_of_edge(skeleton), skeleton.edges)
+        colors = shades(skeleton, color, skeleton.branch_of_edge, skeleton.edges)
         style = dict(colors=colors, linewidths=line_width, capstyle="round", clip_on=False, zorder=2)
         axes.add_collection(Line3DCollection(vertices[skeleton.edges], **style))
     if skeleton.report.root:
