@@ -7,7 +7,7 @@ from itertools import chain
 
 import numpy as np
 import pytest
-from glsk_studies import ablation, accuracy, axes, batch, clouds, crosscheck, options
+from glsk_studies import ablation, accuracy, axes, batch, clouds, crosscheck, options, sensitivity
 from typer.testing import CliRunner
 
 from glsk_o3d import Denoiser, OutlierRemover, Thinner, Tracer, pipelines, read_cloud
@@ -192,3 +192,34 @@ def test_scans_for_batches(tmp_path):
 def test_measures_of_options():
     found = options.measure("`torus`", "Refiner.spacing=1", 0)
     assert (found["topology"], found["leaves"]) == (True, 0)
+
+
+@pytest.mark.parametrize(
+    "kind", ["Refiner", "curve/topology/loops", "curve/numbers", "geometry/winding", "filters/thinner"]
+)
+def test_a_number_is_changed_while_it_is_measured(kind):
+    """An option, a weight, a field of a step, or a constant."""
+    pipelines.default()(torus(300).points)  # so that all modules are there
+    numbers = [number for number in sensitivity.steering() if number.place == kind]
+    first = repr(pipelines.default())
+    for number in numbers:
+        before = values(number)
+        with sensitivity.changed(number.place, number.name, number.value, 1.25) as pipeline:
+            assert kind != "Refiner" or repr(pipeline) != first
+            assert kind == "Refiner" or all(
+                now > was for now, was in zip(map(abs, values(number)), map(abs, before), strict=True)
+            )
+        assert values(number) == before
+    assert numbers
+
+
+def values(number):
+    """What a number is now, as often as it is kept."""
+    if ": " in number.name:
+        about, fact = number.name.split(": ")
+        return [next(it for it in sensitivity.QUESTIONS if it.about == about).weights[fact]]
+    if number.place[0].isupper():
+        return []
+    module = vars(sys.modules[f"glsk_o3d.{number.place.replace('/', '.')}"])
+    steps = [value for value in module.values() if number.name in getattr(value, "__dict__", {})]
+    return [getattr(step, number.name) for step in steps if not isinstance(step, type)] or [module[number.name]]
