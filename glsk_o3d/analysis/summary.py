@@ -3,6 +3,8 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+import numpy as np
+
 from ..data.report import NOT_CONTRACTED, IterationRecord
 from ..data.skeleton import Skeleton
 
@@ -38,6 +40,8 @@ def summary(skeleton: Skeleton, seconds: float) -> dict[str, Any]:
         "joined": len(report.joined),
         "uncertain": len(report.uncertain),
         **({"samples": report.n_draws, "agreeing": report.n_agreeing} if report.n_draws else {}),
+        "verdict": skeleton.verdict.value,
+        "score": None if np.isnan(skeleton.score) else round(skeleton.score, 3),
         "iterations": len(report.iterations),
         "converged": report.converged,
         "stop_reason": report.stop_reason,

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..analysis.summary import ITERATION_COLUMNS, iteration_rows
+from ..curve.detail import with_limbs
 from ..data.decisions import coordinates
 from ..data.report import Markup, Report, markup
 from ..data.skeleton import Skeleton
@@ -22,6 +23,7 @@ from ..io.geometry import to_tubes
 from .figures import MOST_DRAWN_POINTS, counts, thinned
 
 MOST_LISTED_ROWS = 12  # of a table
+LIMB_STEPS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # of the slider
 EYE = dict(x=0.9, y=-1.5, z=0.7)  # fitted to the eye: in front, somewhat to the right and above
 HOVER = (
     "vertex %{customdata[0]} · branch %{customdata[1]} · radius %{customdata[2]:.4g} · confidence %{customdata[3]:.2f}"
@@ -39,8 +41,8 @@ def save_report(
     """Write a page that shows a skeleton and the run that made it.
 
     The page is one HTML file of 5 MB that works offline in any browser with WebGL: cloud, skeleton and radius tubes to
-    turn and zoom by plotly, which comes with Open3D; the run's numbers, warnings, recipe and versions. Of larger clouds
-    20 000 points are shown, drawn at random.
+    turn and zoom by plotly, which comes with Open3D, with a slider for limbs; the run's numbers, warnings, recipe and
+    versions. Of larger clouds 20 000 points are shown, drawn at random.
 
     Parameters
     ----------
@@ -80,7 +82,10 @@ def _page(skeleton: Skeleton, title: str, facts: Mapping[str, Mapping[str, str]]
         title=title,
         subtitle=f"{kind} · glsk-o3d {report.versions.get('glsk-o3d', '')} · {date}",
         style=Markup((assets / "report.css").read_text("utf-8")),
-        counts=[markup("<div><dt>{}</dt><dd>{}</dd></div>", *item) for item in counts(skeleton).items()],
+        counts=[
+            markup("<div><dt>{}</dt><dd>{}</dd></div>", *item)
+            for item in {**counts(skeleton), **verdict(skeleton)}.items()
+        ],
         warnings=warnings(report.warnings),
         view=Markup(_view(skeleton, skeleton.points[shown])),
         thinning=f"The view shows {len(shown):,} of {finite:,} points." if len(shown) < finite else "",
@@ -97,32 +102,56 @@ def _view(skeleton: Skeleton, points: np.ndarray) -> str:
     axis = dict(visible=False, showspikes=False)
     scene = dict(xaxis=axis, yaxis=axis, zaxis=axis, aspectmode="data", camera_eye=EYE)
     paper = dict(paper_bgcolor="rgba(0,0,0,0)", margin=dict(l=0, r=0, t=0, b=0), font_color="#808890")
-    figure = graph_objects.Figure(traces(skeleton, points), dict(scene=scene, legend_x=0, **paper))
+    layout = dict(scene=scene, legend_x=0, sliders=sliders(skeleton, points), **paper)
+    figure = graph_objects.Figure(traces(skeleton, points), layout)
     return figure.to_html(full_html=False, include_mathjax=False, config=dict(displaylogo=False), div_id="view")
 
 
 def traces(skeleton: Skeleton, points: np.ndarray) -> list[Any]:
     """What the view can show, as traces of plotly; its unit is half the diagonal, for float32."""
-    graph_objects = require("plotly.graph_objects")
-    drawn = np.concatenate([points, skeleton.vertices])
-    low, high = box(drawn) if len(drawn) else np.zeros((2, 3))
-    centre, unit = low + (high - low) / 2, float(np.linalg.norm(high - low)) / 2 or 1.0
-
-    def scaled(places: np.ndarray) -> dict[str, np.ndarray]:
-        return dict(zip("xyz", ((places - centre) / unit).T, strict=True))
-
+    graph_objects, frame = require("plotly.graph_objects"), _frame(skeleton, points)
     style = dict(mode="markers", marker=dict(size=1.2, color="#9aa1a8", opacity=0.5), hoverinfo="skip")
-    shown = [graph_objects.Scatter3d(**scaled(points), name="cloud", **style)] if len(points) else []
+    shown = [graph_objects.Scatter3d(**_scaled(points, *frame), name="cloud", **style)] if len(points) else []
     if len(skeleton.vertices):
         places, styles = _curves(skeleton)
-        shown += [graph_objects.Scatter3d(**scaled(places), **style) for style in styles]
+        shown += [graph_objects.Scatter3d(**_scaled(places, *frame), **style) for style in styles]
     if len(skeleton.vertices) and np.isfinite(skeleton.radii).all():
         mesh = to_tubes(skeleton, "branch", sides=8)
         corners = dict(zip("ijk", np.asarray(mesh.triangles).T, strict=True))
         style = dict(vertexcolor=_css(np.asarray(mesh.vertex_colors)), visible="legendonly", hoverinfo="skip")
-        vertices = scaled(np.asarray(mesh.vertices))
+        vertices = _scaled(np.asarray(mesh.vertices), *frame)
         shown.append(graph_objects.Mesh3d(**vertices, **corners, name="radius tubes", showlegend=True, **style))
     return shown
+
+
+def sliders(skeleton: Skeleton, points: np.ndarray) -> list[dict[str, Any]]:
+    """The slider of plotly that shows limbs from another probability on; none if that makes no difference."""
+    steps, frame, seen = [], _frame(skeleton, points), set[int]()
+    for least in LIMB_STEPS:
+        other = with_limbs(skeleton, least)
+        places, (style, *_) = _curves(other)
+        curve = {name: [values] for name, values in _scaled(places, *frame).items()}
+        curve |= {"line.color": [style["line"]["color"]], "marker.color": [style["marker"]["color"]]}
+        curve["customdata"] = [style["customdata"]]
+        steps.append(dict(label=f"{least:.1f}", method="restyle", args=[curve, [int(len(points) > 0)]]))
+        seen.add(len(other.vertices))
+    current = dict(prefix="limbs from a probability of ")
+    return (
+        [dict(steps=steps, active=LIMB_STEPS.index(0.5), currentvalue=current, pad=dict(l=20, r=20, b=30))]
+        if len(seen) > 1
+        else []
+    )
+
+
+def _frame(skeleton: Skeleton, points: np.ndarray) -> tuple[np.ndarray, float]:
+    """Centre and half the diagonal of all that is drawn."""
+    drawn = np.concatenate([points, skeleton.vertices])
+    low, high = box(drawn) if len(drawn) else np.zeros((2, 3))
+    return low + (high - low) / 2, float(np.linalg.norm(high - low)) / 2 or 1.0
+
+
+def _scaled(places: np.ndarray, centre: np.ndarray, unit: float) -> dict[str, np.ndarray]:
+    return dict(zip("xyz", ((places - centre) / unit).T, strict=True))
 
 
 def _curves(skeleton: Skeleton) -> tuple[np.ndarray, list[dict[str, Any]]]:
@@ -151,6 +180,12 @@ def _css(colors: np.ndarray) -> list[str]:
 
 
 # ------------------------------------------------------------ the parts, all by `markup`, which escapes every text
+
+
+def verdict(skeleton: Skeleton) -> dict[str, str]:
+    """Whether to rely on the skeleton, with its score."""
+    score = "" if np.isnan(skeleton.score) else f", {skeleton.score:.2f}"
+    return {"verdict": f"{skeleton.verdict.value}{score}"} if len(skeleton.vertices) else {}
 
 
 def warnings(messages: Iterable[str]) -> Markup:

@@ -12,7 +12,8 @@ from glsk_o3d import save_report, to_line_set
 from glsk_o3d.data.decisions import Decision, Supported
 from glsk_o3d.data.report import IterationRecord, Report
 from glsk_o3d.data.verdict import Reason
-from glsk_o3d.samples import torus
+from glsk_o3d.editing import detailed
+from glsk_o3d.samples import sauropod, torus
 from glsk_o3d.viewing import page
 
 # -------------------------------------------------------------------------------------------------------------- view
@@ -33,6 +34,17 @@ def test_the_traces_are_the_skeleton_up_to_scale():
     assert len(tubes.x) == len(np.asarray(glsk.to_tubes(skeleton, sides=8).vertices))
     colors = [[int(color[i : i + 2], 16) / 255 for i in (1, 3, 5)] for color in curve.line.color[::3]]
     np.testing.assert_allclose(colors, np.asarray(to_line_set(skeleton, "branch").colors), atol=0.003)
+
+
+def test_the_slider_shows_the_skeleton_with_other_limbs():
+    skeleton = glsk.skeletonize(sauropod(2000).points)
+    (slider,) = page.sliders(skeleton, skeleton.points)
+    for least, step in zip(page.LIMB_STEPS, slider["steps"], strict=True):
+        (changes, traces), other = step["args"], detailed(skeleton, limb=least)
+        assert traces == [1]  # behind the cloud
+        assert len(changes["x"][0]) == len(changes["line.color"][0]) == 3 * len(other.edges)
+    assert slider["steps"][slider["active"]]["label"] == "0.5"
+    assert page.sliders(dataclasses.replace(skeleton, report=glsk.Report()), skeleton.points) == []  # nothing was judged
 
 
 def test_large_clouds_are_thinned(tree, tmp_path):
