@@ -28,6 +28,10 @@ def batch(
     sample: options.Sample = None,
     drop_invalid: options.DropInvalid = False,
     cut_loops: options.CutLoops = False,
+    accept: Annotated[
+        str | None,
+        option("VERDICT", "Write only skeletons with this verdict, good or doubtful, or a better one."),
+    ] = None,
     workers: Annotated[int | None, option("N", "Processes; by default one for each core at hand.", min=1)] = None,
     shard: Annotated[
         str | None, option("I/N", "Take every N-th scan from the I-th on, such as 2/8: a job of an array.")
@@ -54,6 +58,7 @@ def batch(
         formats=[word.strip() for word in formats.split(",") if word.strip()],
         preview=preview,
         cut_loops=cut_loops,
+        accept=accept,
         recursive=recursive,
         shard=_shard(shard),
         where=where,

@@ -8,6 +8,7 @@ from enum import Enum
 
 import numpy as np
 
+from ..errors import InvalidParameterError
 from ..geometry.groups import quantile
 from .decisions import Decision, logistic
 
@@ -38,6 +39,15 @@ class Verdict(str, Enum):
         """Whether it is as good as another one, or better."""
         order = list(Verdict)
         return order.index(self) <= order.index(other)
+
+
+def as_verdict(value: Verdict | str | None) -> Verdict | None:
+    """A verdict, also by its word; None for none, and InvalidParameterError for other words."""
+    try:
+        return None if value is None else Verdict(value)
+    except ValueError:
+        words = ", ".join(repr(verdict.value) for verdict in Verdict)
+        raise InvalidParameterError(f"accept = {value!r}: must be one of {words}") from None
 
 
 CODES = {

@@ -44,9 +44,7 @@ def test_the_slider_shows_the_skeleton_with_other_limbs():
         assert traces == [1]  # behind the cloud
         assert len(changes["x"][0]) == len(changes["line.color"][0]) == 3 * len(other.edges)
     assert slider["steps"][slider["active"]]["label"] == "0.5"
-    assert (
-        page.sliders(dataclasses.replace(skeleton, report=glsk.Report()), skeleton.points) == []
-    )
+    assert page.sliders(dataclasses.replace(skeleton, report=glsk.Report()), skeleton.points) == []
 
 
 def test_large_clouds_are_thinned(tree, tmp_path):

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ...api import as_pipeline
+from ...data.verdict import Verdict, as_verdict
 from ...errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ...interop.packages import require_for
 from ...io.paths import unknown_ending
@@ -78,6 +79,7 @@ def plan_batch(
     formats: Sequence[str] = ("ply",),
     preview: bool = False,
     cut_loops: bool = False,
+    accept: Verdict | str | None = None,
     recursive: bool = False,
     shard: tuple[int, int] | None = None,
     where: str | None = None,
@@ -102,6 +104,8 @@ def plan_batch(
         Also make pictures.
     cut_loops : bool
         Cut loops open for formats that hold only trees.
+    accept : Verdict or str, optional
+        The worst verdict, ``"good"`` or ``"doubtful"``, of skeletons that are written; others have failed.
     recursive : bool
         Take also the clouds in sub-folders.
     shard : (int, int), optional
@@ -150,6 +154,8 @@ def plan_batch(
     if where is not None:
         parsed(where)
     settings: dict[str, Any] = {"recipe": recipe, "cut_loops": cut_loops, "where": where, "cut": cut and asdict(cut)}
+    least = as_verdict(accept)
+    settings |= {"accept": least} if least else {}
     parameters = hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
     out = Path(os.path.abspath(out_dir))
     ledger = Ledger(out)
@@ -157,7 +163,7 @@ def plan_batch(
     sources, left_out = find_inputs(given, out, recursive=recursive)
     if shard is not None:
         sources = dict(list(sources.items())[_slice_of(*shard)])
-    common: dict[str, Any] = dict(out_dir=str(out), recipe=recipe, cut_loops=cut_loops, where=where)
+    common: dict[str, Any] = dict(out_dir=str(out), recipe=recipe, cut_loops=cut_loops, where=where, accept=least)
     tasks = [
         Task(name, str(path), str(path), tuple(name + ending for ending in endings), **common)
         for path, name in sources.items()

@@ -18,7 +18,7 @@ from ... import __version__
 from ...analysis.summary import summary
 from ...data.report import Report
 from ...data.skeleton import Skeleton
-from ...data.verdict import Reason
+from ...data.verdict import Reason, Verdict
 from ...errors import GlskError, InvalidCloudError, in_words
 from ...io.scans import read_scan
 from ...io.skeletons import read_skeleton, save_skeleton
@@ -45,6 +45,7 @@ class Task:
     recipe: dict[str, Any] = field(default_factory=dict)
     cut_loops: bool = False
     where: str | None = None  # the points to take
+    accept: Verdict | None = None  # the worst verdict of a skeleton that is written
     is_tile: bool = False
     needs: tuple[str, ...] = ()  # names of the tiles that are joined; `path` then holds what is known of them
 
@@ -81,6 +82,9 @@ def _skeletonize(task: Task, row: Row, messages: list[str]) -> None:
     messages += skeleton.report.warnings
     facts = summary(skeleton, 0.0).items()
     row |= {name: None if isinstance(value, float) and not math.isfinite(value) else value for name, value in facts}
+    if task.accept and not task.is_tile and not skeleton.verdict.is_at_least(task.accept):
+        why = "; ".join(skeleton.report.warnings) or f"its score is {skeleton.score:.2f}"
+        raise InvalidCloudError(f"the skeleton is not accepted: {skeleton.verdict.value}: {why}")
     for output in task.outputs:
         path = Path(task.out_dir, output)
         if output.endswith(".png"):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import glsk_o3d
-from glsk_o3d import Connector, InvalidParameterError, RecipeError, pipelines, read_skeleton, skeletonize
+from glsk_o3d import Connector, InvalidParameterError, RecipeError, pipelines, read_skeleton, samples, skeletonize
 from glsk_o3d.apps.batch import plan_batch, run_batch
 from glsk_o3d.apps.batch.ledger import file_hash
 from glsk_o3d.recipes import to_recipe
@@ -62,6 +62,19 @@ def test_a_second_run_does_what_has_changed(run, scans, rows, write, tmp_path):
     write(scans / "bad.ply")
     assert run() == {"b": "failed before", "bad": "failed before"}
     assert {row["status"] for row in rows().values()} == {"done"}
+
+
+def test_only_accepted_skeletons_are_written(run, scans, rows, write, tmp_path):
+    write(scans / "flat.ply", points=samples.sheet(400).points)
+    run(accept="good")
+    assert {name: row["status"] for name, row in rows().items()} == {**dict.fromkeys("abc", "done"), "flat": "failed"}
+    flat = rows()["flat"]
+    assert flat["verdict"] == "no curve skeleton"
+    assert "not accepted: no curve skeleton: sheet-like" in flat["error"]
+    assert not (tmp_path / "out" / "flat.ply").exists()
+    assert run() == {**dict.fromkeys("abc", "parameters changed"), "flat": "failed before"}
+    with pytest.raises(InvalidParameterError, match="accept = 'fair'"):
+        run(accept="fair")
 
 
 def test_shards_are_disjoint_and_together_all(run, scans, rows):

@@ -1,0 +1,77 @@
+"""The verdict and the score of a skeleton, and the reasons for them."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from glsk_o3d import Decision, InvalidParameterError, Reason, Report, Skeleton, Verdict, samples, skeletonize
+from glsk_o3d.data.verdict import CODES, as_verdict, graph_score, verdict_of
+
+
+def decision(about, probability):
+    return Decision(about, (0.0, 0.0, 0.0), probability, False)
+
+
+def test_verdicts_have_an_order():
+    for (i, a), (j, b) in itertools.product(enumerate(Verdict), repeat=2):
+        assert a.is_at_least(b) == (i <= j)
+    assert as_verdict("doubtful") is Verdict.DOUBTFUL
+    assert as_verdict(None) is None
+    with pytest.raises(InvalidParameterError, match="'good', 'doubtful'"):
+        as_verdict("bad")
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_the_worst_reason_decides(code):
+    best = Reason("option", "an option was not taken")
+    assert verdict_of(0.99, [best, Reason(code, "text"), best]) is CODES[code]
+    assert verdict_of(0.5, [Reason(code, "text")]) is max(CODES[code], Verdict.DOUBTFUL, key=list(Verdict).index)
+
+
+@pytest.mark.parametrize("about", ["loop", "air", "gap", "limb"])
+def test_the_least_certain_decision_counts_whatever_its_answer(about):
+    sure = graph_score([], np.ones(5))
+    scores = [graph_score([decision(about, 0.99), decision(about, p)], np.ones(5)) for p in (0.01, 0.3, 0.5, 0.7, 0.99)]
+    np.testing.assert_allclose(scores, scores[::-1])
+    assert scores[2] < scores[1] < scores[0] < sure
+
+
+def test_confidence_counts_by_its_tenth_percentile():
+    few, many = np.r_[np.zeros(5), np.ones(95)], np.r_[np.zeros(20), np.ones(80)]
+    assert graph_score([], few) == graph_score([], np.ones(100))
+    assert graph_score([], many) == graph_score([], np.zeros(100)) < graph_score([], np.ones(100))
+
+
+def test_what_is_unknown_is_doubtful():
+    lines = Skeleton([[0, 0, 0], [1, 0, 0]], [[0, 1]], np.ones(2), (), (), ())
+    assert np.isnan(lines.score)
+    assert lines.verdict is Verdict.DOUBTFUL
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+def test_skeletons_have_verdicts():
+    """Of each kind one; the text of a reason is the warning, and it survives a file."""
+    cases = [(samples.torus, Verdict.GOOD), (samples.sheet, Verdict.NO_CURVE_SKELETON)]
+    for make, verdict in [*cases, (samples.sphere, Verdict.NO_CURVE_SKELETON)]:
+        skeleton = skeletonize(make(1000).points)
+        assert skeleton.verdict is verdict
+        assert skeleton.report.warnings == tuple(reason.text for reason in skeleton.report.reasons)
+        assert Report.from_dict(skeleton.report.to_dict()) == skeleton.report
+    noisy = skeletonize(samples.sauropod(400, noise=0.03).points)
+    assert noisy.verdict is Verdict.DOUBTFUL
+    assert noisy.score < 0.8
+
+
+def test_files_of_earlier_versions_have_warnings():
+    report = Report.from_dict({"warnings": ["sheet-like: all of it"]})
+    assert report.reasons == (Reason("other", "sheet-like: all of it"),)
+    with pytest.raises(ValueError, match="unknown code"):
+        Report.from_dict({"reasons": [{"code": "weather", "text": "rain"}]})
+
+
+def test_the_score_follows_the_decisions_of_an_edited_skeleton():
+    ring = skeletonize(samples.torus(1000).points)
+    report = replace(ring.report, decisions=(*ring.report.decisions, decision("loop", 0.5)))
+    assert replace(ring, report=report).score < ring.score
