@@ -72,7 +72,7 @@ def test_only_accepted_skeletons_are_written(run, scans, rows, write, tmp_path):
     assert flat["verdict"] == "no curve skeleton"
     assert "not accepted: no curve skeleton: sheet-like" in flat["error"]
     assert not (tmp_path / "out" / "flat.ply").exists()
-    assert run() == {**dict.fromkeys("abc", "parameters changed"), "flat": "failed before"}
+    assert run() == {**dict.fromkeys("abc", "other parameters"), "flat": "failed before"}
     with pytest.raises(InvalidParameterError, match="accept = 'fair'"):
         run(accept="fair")
 
