@@ -200,6 +200,21 @@ def test_the_default_finds_the_axis_of_known_shapes(shape, components, loops, le
     assert np.median(skeleton.radii) == pytest.approx(sample.radii.mean(), rel=0.1)
 
 
+@pytest.mark.parametrize("n", [2000, 4096, 16384])
+@pytest.mark.parametrize(
+    ("shape", "components", "loops", "leaves"),
+    [("torus", 1, 1, 0), ("y_junction", 1, 0, 3), ("sauropod", 1, 1, 6), ("two_rings", 2, 2, 0)],
+)
+def test_fast_gives_right_graphs_from_few_points(shape, n, components, loops, leaves):
+    sample = samples.SAMPLES[shape](n=n)
+    skeleton = skeletonize(sample.points, "fast")
+    assert (skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)) == (components, loops, leaves)
+    assert skeleton.report.n_sampled < 1000
+    assert max(solve.n_points for solve in skeleton.report.iterations) < 1000
+    assert len(skeleton.vertex_of_point) == n
+    assert compare(skeleton, sample).error < 0.4
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["cao2010", "default"])
 def test_a_skeleton_moves_and_scales_with_its_cloud(name):

@@ -49,7 +49,7 @@ NAMES = {
         "Their data": ("Cloud", "Points", "Contraction"),
     },
     "named_pipelines": {
-        "For general use": ("default", "tree"),
+        "For general use": ("default", "fast", "tree"),
         "The first half": ("rings",),
         "As they were published": ("wen2024", "cao2010"),
     },

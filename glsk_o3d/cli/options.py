@@ -49,7 +49,7 @@ Sample = Annotated[
 ]
 
 PipelineName = Annotated[
-    str, option("NAME|FILE", "default, tree, wen2024, cao2010, a plugin's, or a recipe or a result in json.")
+    str, option("NAME|FILE", "default, fast, tree, wen2024, cao2010, a plugin's, or a recipe or a result in json.")
 ]
 Settings = Annotated[
     list[str] | None,
