@@ -37,7 +37,7 @@ def skeletonize(
     cloud : open3d.geometry.PointCloud, open3d.t.geometry.PointCloud, TriangleMesh of either kind, or (N, 3) array
         Points, or a mesh, of which the points are its vertices or, where these are too far apart, a sample by area; see
         ``Sampler.sample``. They need no order, normals or orientation, and are not modified.
-    pipeline : Pipeline, {"default", "fast", "tree", "wen2024", "cao2010"}, name of a plugin's pipeline, or path of a recipe
+    pipeline : Pipeline, {"default", "fast", "tree", "wen2024", "cao2010"}, name of a plugin's, or path of a recipe
         A name that ends in ``.json`` is a path. A mapping is options for ``"default"``.
     on_iteration : callable, optional
         Called with the IterationRecord of each solve; return False, or 0, to stop the contraction there.

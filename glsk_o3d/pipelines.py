@@ -77,10 +77,10 @@ def default() -> Pipeline[Cloud, Skeleton]:
 def fast() -> Pipeline[Cloud, Skeleton]:
     """For control loops: at most a third of the time of `default` from 2000 points on; docs/speed.md has its accuracy.
 
-    Two solves contract a sample of about 900 points, half as strongly as in `default`. Only the questions about loops and
-    limbs are asked, and no fit to the axis follows: loops and limbs are right more often than places. The Denoiser is
-    left out, since the neighbours in such a sample are far apart, and the Tracer, since thin parts have no surface in
-    it. Clouds of up to 1800 points are taken whole, which takes longer.
+    Two solves contract a sample of about 800 points, half as strongly as in `default`. Only the questions about loops
+    and limbs are asked, and no fit to the axis follows: loops and limbs are right more often than places. The Denoiser
+    is left out, since the neighbours in such a sample are far apart, and the Tracer, since thin parts have no surface
+    in it. Clouds of up to 1600 points are taken whole, which takes longer.
 
     Examples
     --------
@@ -90,8 +90,8 @@ def fast() -> Pipeline[Cloud, Skeleton]:
     (1, True)
     """
     contractor = Contractor(max_iterations=2, initial_contraction=0.1)
-    refiner = Refiner(recentre=0, handle=0.2, air=0, bridge=0, set_aside=False)
-    return Sampler(size=900) | OutlierRemover() | RingBuilder() | contractor | Connector() | refiner
+    refiner = Refiner(recentre=0, handle=0.2, limb=0.35, air=0, bridge=0, set_aside=False)
+    return Sampler(size=800) | OutlierRemover() | RingBuilder() | contractor | Connector() | refiner
 
 
 def tree(root: str | Any = "z") -> Pipeline[Cloud, Skeleton]:
