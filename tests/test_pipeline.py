@@ -200,6 +200,7 @@ def test_the_default_finds_the_axis_of_known_shapes(shape, components, loops, le
     assert np.median(skeleton.radii) == pytest.approx(sample.radii.mean(), rel=0.1)
 
 
+@pytest.mark.filterwarnings("ignore:uncertain topology")  # about the sauropod's handle
 @pytest.mark.parametrize("n", [2000, 4096, 16384])
 @pytest.mark.parametrize(
     ("shape", "components", "loops", "leaves"),
