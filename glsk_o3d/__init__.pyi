@@ -50,6 +50,7 @@ from .io.skeletons import read_skeleton, read_truth, save_skeleton
 from .io.streaming import annotate_file, read_sample
 from .pipeline import Filter, Pipeline
 from .recipes import from_recipe, load_recipe, save_recipe, to_recipe
+from .tracking import Tracked, Tracker
 from .viewing.page import save_report
 from .viewing.plot import plot_skeleton
 from .viewing.preview import save_preview
@@ -95,6 +96,8 @@ __all__ = [
     "Thinner",
     "Tracer",
     "Verdict",
+    "Tracked",
+    "Tracker",
     "analysis",
     "annotate",
     "annotate_file",

@@ -33,6 +33,7 @@ TASKS = {
 NAMES = {
     "skeletons": {
         "One call": ("skeletonize", "Skeleton"),
+        "One object in time": ("Tracker", "Tracked"),
         "Which parts depend on single points": ("support", "Supported"),
         "The record of a run": ("Report", "IterationRecord", "Decision", "Reason", "Verdict"),
         "Fewer points, without a skeleton": ("remove_redundant_points",),

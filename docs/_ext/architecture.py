@@ -17,6 +17,7 @@ ROWS = (
     {"applications": ("apps",)},
     {"pictures and windows": ("viewing",)},
     {"files": ("io",)},
+    {"tracking": ("tracking",)},
     {"editing": ("editing",)},
     {"analysis": ("analysis",)},
     {"api": ("api",)},

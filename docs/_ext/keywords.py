@@ -30,6 +30,10 @@ KEYWORDS = {
         "robot, robots, ros, ros2, ros 2, urdf, bag, rosbag, node, depth camera, depth image, rgb-d, rgbd, "
         "realsense, kinect, flying pixels, mixed pixels"
     ),
+    "docs/tracking": (
+        "track, tracking, tracker, time, frames, video, growth, growing, phenotyping, identity, registration, "
+        "icp, motion, change"
+    ),
     "docs/meshlab": "meshlab, pymeshlab, mlx, filter script, filter scripts",
     "docs/batch": "batch, parallel, cluster, shard, tiles, ledger, many clouds, many scans, large clouds, memory",
     "docs/formats": (

@@ -1,0 +1,42 @@
+"""Rigid registration of frames to the points of an earlier one, by Open3D."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from .clouds import to_point_cloud
+from .packages import import_open3d
+
+NORMAL_NEIGHBOURS = 16  # fitted: points that say where the surface of the reference faces
+REGISTERED_POINTS = 1500  # speed: of a frame that are registered
+CAPTURE = 0.1, 0.04  # fitted: over the diagonal, how far points may be from the reference, first and then
+NEAR_SPACINGS = 3.0  # derived: of two samples of a surface 0.998 of the points are nearer, by ln 2 * 3^2
+
+
+class Reference:
+    """The points of a frame to which others are registered."""
+
+    def __init__(self, points: np.ndarray) -> None:
+        self._points, self._tree = points, cKDTree(points)
+        self._cloud = to_point_cloud(points)
+        self._cloud.estimate_normals(import_open3d().geometry.KDTreeSearchParamKNN(NORMAL_NEIGHBOURS))
+        self._near = NEAR_SPACINGS * np.median(self._tree.query(points, min(2, len(points)))[0].reshape(-1, 1)[1::2])
+
+    def pose(self, points: np.ndarray, start: np.ndarray) -> np.ndarray:
+        """The rigid motion (4, 4) from here to the points of a later frame, near the one of the frame before."""
+        registration = import_open3d().pipelines.registration
+        some = to_point_cloud(points[:: max(len(points) // REGISTERED_POINTS, 1)])
+        back = np.linalg.inv(start)
+        for share in CAPTURE:
+            reach = share * np.linalg.norm(np.ptp(self._points, axis=0))
+            estimation = registration.TransformationEstimationPointToPlane(registration.TukeyLoss(k=reach / 2))
+            criteria = registration.ICPConvergenceCriteria(max_iteration=50)
+            back = registration.registration_icp(some, self._cloud, reach, back, estimation, criteria).transformation
+        return np.linalg.inv(back)
+
+    def unexplained(self, points: np.ndarray, pose: np.ndarray) -> float:
+        """Share of points without one of the reference near, or the other way round: the larger one."""
+        there = (points - pose[:3, 3]) @ pose[:3, :3]
+        pairs = (self._tree.query(there)[0], cKDTree(there).query(self._points)[0])
+        return max(float((distance > self._near).mean()) for distance in pairs)
