@@ -1,4 +1,4 @@
-"""One object in time: a skeleton that stays the same graph from frame to frame, with branches that keep their names."""
+"""One object in time: a skeleton that keeps its graph from frame to frame, and branches that keep their identities."""
 
 from __future__ import annotations
 
@@ -102,7 +102,6 @@ class Tracker:
     Raises
     ------
     InvalidParameterError
-        An option is wrong.
 
     Examples
     --------
@@ -112,8 +111,6 @@ class Tracker:
     ...     tracked = tracker(y_junction(1000, seed=frame).points + [0.01 * frame, 0, 0])
     >>> tracked.identity.tolist(), tracked.new, tracked.lost
     ([0, 1, 2], (), ())
-    >>> bool(abs(tracked.motion[0, 3] - 0.01) < 0.003)
-    True
     """
 
     _held: Skeleton  # in the pose of the reference
@@ -157,7 +154,6 @@ class Tracker:
         InvalidCloudError
             The points cannot be skeletonised.
         MissingPackageError
-            Open3D is missing.
         """
         points = cloud_points(cloud)
         if self._n_computed == 0:

@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from glsk_studies import tracking as study
 from scipy.spatial.transform import Rotation
 
 from glsk_o3d import GlskError, InvalidCloudError, InvalidParameterError, Tracker, pipelines, samples
@@ -148,3 +149,14 @@ def test_frames_without_points_are_refused_and_the_next_one_goes_on():
     with pytest.raises(GlskError):
         tracker(toy()[:4])
     assert (tracker(toy(seed=1)).identity == first.identity).all()
+
+
+def test_the_study_compares_single_frames_with_tracked_ones():
+    rows = [
+        dict(shape="y_junction", condition="moving", method=method)
+        | study.measure("y_junction", "moving", method, frames=7)
+        for method in ("each frame", "tracked")
+    ]
+    assert rows[1]["graphs"] == rows[1]["most frequent"] == 1
+    assert rows[1]["move [mm]"] < 1
+    assert [line[1] for line in study.tables(rows)[0][2]] == ["each frame", "tracked"]
