@@ -113,6 +113,15 @@ def test_one_odd_frame_changes_nothing():
     assert not any(frame.new or frame.lost for frame in frames[1:])
 
 
+def test_the_origin_may_be_far_away():
+    tracker, offset = Tracker(patience=1), np.array([4e6, 5e6, 300.0])  # as of a map
+    for seed in range(3):
+        tracked = tracker(plant([0.3, 0.4], seed) + offset + [0.05 * seed, 0, 0])
+    start = np.append(offset, 1)
+    np.testing.assert_allclose((tracked.motion @ start - start)[:3], [0.05, 0, 0], atol=0.01)  # a third of the spacing
+    assert (tracked.is_computed, tracked.identity.tolist()) == (False, [0, 1, 2])
+
+
 def test_between_changes_a_vertex_is_one_place_and_points_are_those_of_the_frame():
     tracker = Tracker(pipelines.default().with_options(drop_invalid=True), patience=1)
     first, points = tracker(toy()), toy(seed=1)

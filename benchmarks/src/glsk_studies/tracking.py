@@ -39,7 +39,8 @@ def surface(name: str, n: int, seed: int) -> np.ndarray:
         o3d.utility.random.seed(seed)
         mesh = o3d.io.read_triangle_mesh(f"{MESHES / name}.ply") if name != "mug" else mug_meshes()[0] + mug_meshes()[1]
         points, corners = np.asarray(mesh.sample_points_uniformly(n).points), mesh.vertices
-    return (points - np.mean(corners, axis=0)) * SIZE / np.linalg.norm(np.ptp(corners, axis=0))
+    middle = (np.min(corners, axis=0) + np.max(corners, axis=0)) / 2
+    return (points - middle) * SIZE / np.linalg.norm(np.ptp(corners, axis=0))
 
 
 def frame(name: str, condition: str, seed: int, pose: np.ndarray) -> np.ndarray:
@@ -76,8 +77,7 @@ def measure(name: str, condition: str, method: str, frames: int) -> dict:
     resting, names = resting[FIRST:], names[FIRST:]
     graphs = [(it.n_components, it.n_loops, len(it.leaves)) for it in resting]
     steps = 1e3 * np.concatenate([after.nearest(before.vertices).distance for before, after in pairwise(resting)])
-    middles = [it.vertices[it.edges].mean(axis=1) for it in resting]
-    known = [names[0][resting[0].nearest(places).branch] for places in middles]  # the names of these places at first
+    known = [names[0][resting[0].nearest(it.vertices[it.edges].mean(axis=1)).branch] for it in resting]
     same = [np.mean(a == b[it.branch_of_edge]) for a, b, it in zip(known, names, resting, strict=True)]
     numbers = len({*graphs}), max(map(graphs.count, graphs)) / len(graphs), *np.quantile(steps, (0.5, 0.95)), min(same)
     return dict(zip(COLUMNS, (*map(float, numbers), 1e3 * seconds / frames), strict=True))
