@@ -16,7 +16,7 @@ from .editing import transform
 from .errors import InvalidCloudError
 from .geometry.vectors import TINY, finite_rows, norm
 from .interop.clouds import cloud_points
-from .interop.registration import Reference
+from .interop.registration import Reference, finite_sample
 from .parameters import check_number
 
 END_RADII = 2.0  # fitted: over the radius, from a tracked end to that of a frame at most
@@ -159,7 +159,7 @@ class Tracker:
         if self._n_computed == 0:
             return self._begin(points)
         before = set(self._identity.tolist())
-        seen = points[finite_rows(points)]
+        seen = finite_sample(points)
         if len(seen) == 0:
             raise InvalidCloudError("the frame has no finite point: nothing in it can be followed")
         pose = self._reference.pose(seen, self._pose)
@@ -182,7 +182,7 @@ class Tracker:
 
     def _hold(self, skeleton: Skeleton, points: np.ndarray) -> None:
         """Hold a skeleton in the pose of a frame, to which others are registered from now on."""
-        self._held, self._reference, self._pose = skeleton, Reference(points[finite_rows(points)]), np.eye(4)
+        self._held, self._reference, self._pose = skeleton, Reference(finite_sample(points)), np.eye(4)
 
     def _compare(self, points: np.ndarray, is_explained: bool) -> None:
         """Skeletonise a frame, and change the held graph if enough frames ask for it."""

@@ -9,14 +9,21 @@ from .clouds import to_point_cloud
 from .packages import import_open3d
 
 NORMAL_NEIGHBOURS = 16  # fitted: points that say where the surface of the reference faces
-REGISTERED_POINTS = 1500  # speed: of a frame that are registered
+COMPARED_POINTS = 8192  # speed: of a frame at most
+REGISTERED_POINTS = 2048  # speed: of these, in the steps of ICP
 CAPTURE = 0.1, 0.04  # fitted: over the diagonal, how far points may be from the reference, first and then
 MOST_STEPS = 50  # speed: of ICP; it mostly stops before
 NEAR_SPACINGS = 3.0  # derived: of two samples of a surface 0.998 of the points are nearer, by ln 2 * 3^2
 
 
+def finite_sample(points: np.ndarray) -> np.ndarray:
+    """The finite points, or some of many, drawn at random: every n-th one might be a column of a depth image."""
+    points = points[np.isfinite(points).all(axis=1)]
+    return points[np.random.default_rng(0).permutation(len(points))[:COMPARED_POINTS]]
+
+
 class Reference:
-    """The points of a frame to which others are registered."""
+    """The points of a frame to which others are registered: as `finite_sample` gives both."""
 
     def __init__(self, points: np.ndarray) -> None:
         self._shift = np.eye(4)  # far from the origin a turn about it would be a large step
@@ -29,7 +36,7 @@ class Reference:
     def pose(self, points: np.ndarray, start: np.ndarray) -> np.ndarray:
         """The rigid motion (4, 4) from here to the points of a later frame, near the one of the frame before."""
         registration = import_open3d().pipelines.registration
-        some = points[:: max(len(points) // REGISTERED_POINTS, 1)] - self._shift[:3, 3]
+        some = points[:REGISTERED_POINTS] - self._shift[:3, 3]
         back = np.linalg.inv(start @ self._shift) @ self._shift
         for share in CAPTURE:
             reach = share * np.linalg.norm(np.ptp(self._points, axis=0))
