@@ -29,8 +29,8 @@ class Tracked:
     Attributes
     ----------
     skeleton : Skeleton
-        The tracked graph where the object is in this frame, with the points of this frame. Between two changes of the
-        graph, vertex i is the same place of the object in every frame.
+        The tracked graph where the object is in this frame, with the points of this frame. While earlier frames explain
+        the points, vertex i is the same place of the object in every frame.
     identity : (B,) int array
         The identity of every branch of `skeleton.branches`. Branches that lie on one earlier branch, as when a new one
         divides it, share its identity.
