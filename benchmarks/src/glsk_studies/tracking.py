@@ -15,8 +15,8 @@ from glsk_o3d import Tracker, samples, skeletonize
 from glsk_o3d.editing import transform
 
 from .grasps import cameras, mug_meshes
-from .runs import Jobs, application, run, study
-from .tables import Tables, cells_of, grouped, number
+from .runs import Jobs, Output, application, publish, run
+from .tables import Tables, fixed, grouped, table
 
 MESHES = Path(os.environ.get("GLSK_SHARED", "shared")) / "meshes"
 SHAPES = {"sauropod": dict(cameras=None), "y_junction": {}, "tree": dict(forks=2), "two_rings": {}}
@@ -85,16 +85,14 @@ def measure(name: str, condition: str, method: str, frames: int) -> dict:
 
 def tables(rows: list[dict]) -> Tables:
     """A table for each condition."""
-    header, conditions = ["shape", "method", *COLUMNS, "note"], grouped(rows, "condition").items()
-
-    def cells(row: dict) -> list[str]:
-        return [number(row[name], digits) for name, digits in COLUMNS.items()]
-
-    return [(name, header, cells_of(here, ["shape", "method"], cells, len(COLUMNS))) for name, here in conditions]
+    columns = {"shape": "shape", "method": "method"}
+    columns |= {name: fixed(name, digits) for name, digits in COLUMNS.items()}
+    return [table(condition, here, columns) for condition, here in grouped(rows, "condition").items()]
 
 
-@study(app, tables, where=True)
-def tracked(shapes: str = ",".join(NAMES), frames: int = 30, jobs: Jobs = 2) -> list[dict]:
+@app.command()
+def tracked(shapes: str = ",".join(NAMES), frames: int = 30, jobs: Jobs = 2, output: Output = None) -> None:
     """Graphs, movement and identities of objects of 0.3 m in frames of 4096 points with 1 mm of noise."""
     cases = product(shapes.split(","), CONDITIONS, ("each frame", "tracked"))
-    return run(measure, [(dict(shape=a, condition=b, method=c), (a, b, c, frames)) for a, b, c in cases], jobs)
+    work = [(dict(shape=a, condition=b, method=c), (a, b, c, frames)) for a, b, c in cases]
+    publish(run(measure, work, jobs), tables, output)
