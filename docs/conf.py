@@ -38,7 +38,8 @@ nitpick_ignore = [
     ("py:class", "pymeshlab.pmeshlab.MeshSet"),
     ("py:class", "glsk_o3d.analysis.rows.Rows"),  # of the tables
     ("py:class", "glsk_o3d.data.points.WorkingCloud"),  # of Points and Contraction
-    ("py:class", "glsk_o3d.data.graph.Graph"),  # of Skeleton
+    ("py:class", "glsk_o3d.data.space_curve.SpaceCurve"),  # of Skeleton
+    ("py:class", "enum.Enum"),
     ("py:obj", "glsk_o3d.pipeline.In"),  # type variables
     ("py:obj", "glsk_o3d.pipeline.Out"),
 ]

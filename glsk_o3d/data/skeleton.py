@@ -17,7 +17,7 @@ from .derived import derived
 from .graph import OF_VERTICES, in_order_of_ends
 from .report import Report
 from .space_curve import SpaceCurve
-from .verdict import Verdict, graph_score, verdict_of
+from .verdict import Reason, Verdict, graph_score, reasons_of_score, verdict_of
 
 if TYPE_CHECKING:
     import networkx
@@ -133,9 +133,14 @@ class Skeleton(SpaceCurve):
         return graph_score(self.report.decisions, self.confidence)
 
     @property
+    def reasons(self) -> tuple[Reason, ...]:
+        """Why not to rely on it: those of the report, and a low or unknown score."""
+        return (*self.report.reasons, *reasons_of_score(self.score, self.report.decisions))
+
+    @property
     def verdict(self) -> Verdict:
-        """Whether to rely on it, by its score and by ``report.reasons``; doubtful if that is unknown."""
-        return verdict_of(self.score, self.report.reasons)
+        """Whether to rely on it: the worst verdict that one of the reasons demands."""
+        return verdict_of(self.reasons)
 
     @property
     def whole(self) -> Skeleton:

@@ -368,7 +368,9 @@ def _checked_points(points: Any, name: str = "points") -> np.ndarray:
     except (TypeError, ValueError):
         array = np.empty(0)
     if array.ndim != 2 or array.shape[1] != 3:
-        raise InvalidParameterError(f"{name} = {shown(points)}: must be places (x, y, z)")
+        raise InvalidParameterError(
+            f"{name} = {shown(points)}: must be a row (x, y, z) for each place: [[x, y, z], ...]"
+        )
     if not np.isfinite(array).all():
         raise InvalidParameterError(f"{name}: row {int((~np.isfinite(array)).any(axis=1).argmax())} is not finite")
     return array

@@ -57,6 +57,8 @@ CODES = {
     "weak region": Verdict.DOUBTFUL,
     "close call": Verdict.DOUBTFUL,
     "other samples": Verdict.DOUBTFUL,
+    "low score": Verdict.DOUBTFUL,
+    "unknown score": Verdict.DOUBTFUL,
     "tiles": Verdict.DOUBTFUL,
     "mixed pixels": Verdict.GOOD,
     "option": Verdict.GOOD,
@@ -73,7 +75,7 @@ class Reason:
     ----------
     code : str
         Of `CODES`: ``"sheet"``, ``"sphere"``, ``"no edges"``, ``"weak region"``, ``"close call"``, ``"other samples"``,
-        ``"tiles"``, ``"mixed pixels"``, ``"option"`` or ``"other"``.
+        ``"low score"``, ``"unknown score"``, ``"tiles"``, ``"mixed pixels"``, ``"option"`` or ``"other"``.
     text : str
         The sentence that is issued as a SkeletonWarning.
     place : (x, y, z) or ()
@@ -107,7 +109,20 @@ def graph_score(decisions: Iterable[Decision], confidence: np.ndarray) -> float:
     return logistic(SCORE, dict(certainty, confidence=quantile(known, LOW_CONFIDENCE_SHARE)))
 
 
-def verdict_of(score: float, reasons: Iterable[Reason]) -> Verdict:
-    """The worst verdict that the reasons and the score demand; with an unknown score it is doubtful."""
-    verdicts = [CODES[reason.code] for reason in reasons] + [Verdict.DOUBTFUL] * (not score >= GOOD_SCORE)
-    return max(verdicts, key=list(Verdict).index, default=Verdict.GOOD)
+def reasons_of_score(score: float, decisions: Iterable[Decision]) -> tuple[Reason, ...]:
+    """Why a score makes a verdict doubtful: it is low or unknown. None where it is good."""
+    if score >= GOOD_SCORE:
+        return ()
+    if not score >= 0:
+        text = "unknown score: the skeleton has no confidence, as without a Refiner, or of a file that does not keep it"
+        return (Reason("unknown score", text),)
+    text, place = f"low score: the graph is right with a probability of {score:.2f}", ()
+    least = min(decisions, key=lambda decision: abs(decision.probability - 0.5), default=None)
+    if least is not None:
+        text, place = f"{text}; the least certain decision: {least}", least.place
+    return (Reason("low score", text, place, dict(score=score)),)
+
+
+def verdict_of(reasons: Iterable[Reason]) -> Verdict:
+    """The worst verdict that a reason demands."""
+    return max((CODES[reason.code] for reason in reasons), key=list(Verdict).index, default=Verdict.GOOD)

@@ -125,7 +125,7 @@ def mixed_pixels(points: Points, distance: np.ndarray, factor: float) -> tuple[n
 
     A pixel on an edge has a depth between front and back. Such points are sparse beside a surface a few steps away,
     and in none of their own, since their neighbourhoods are thick: with the ratio r of their distances to the spacing
-    of the surface, and neighbourhoods t times as thick as wide, ``r^2 sqrt(t) > factor``. There are some only where
+    of the surface, and neighbourhoods t times as thick as wide, ``r^2 t > factor``. There are some only where
     more than a few are so by far, with ``r sqrt(t) > factor``. Where little of a cloud is a surface, or too much is
     sparse, they may be twigs: then there are none, and the second result is True.
     """

@@ -125,9 +125,9 @@ def test_a_section_of_a_tube_is_a_disc():
 @pytest.mark.parametrize(
     ("ask", "message"),
     [
-        (lambda s: s.nearest([[0, 0]]), "must be places"),
+        (lambda s: s.nearest([[0, 0]]), "a row"),
         (lambda s: s.nearest([[0, 0, 0], [0, np.nan, 0]]), "row 1 is not finite"),
-        (lambda s: s.nearest("here"), "must be places"),
+        (lambda s: s.nearest("here"), "a row"),
         (lambda s: s.places(9, 0.0), "there are branches 0 to 0"),
         (lambda s: s.places(0, np.inf), "finite"),
         (lambda s: s.section(0, "middle"), "must be a number"),

@@ -26,8 +26,8 @@ def test_verdicts_have_an_order():
 @pytest.mark.parametrize("code", CODES)
 def test_the_worst_reason_decides(code):
     best = Reason("option", "an option was not taken")
-    assert verdict_of(0.99, [best, Reason(code, "text"), best]) is CODES[code]
-    assert verdict_of(0.5, [Reason(code, "text")]) is max(CODES[code], Verdict.DOUBTFUL, key=list(Verdict).index)
+    assert verdict_of([best, Reason(code, "text"), best]) is CODES[code]
+    assert verdict_of([]) is Verdict.GOOD
 
 
 @pytest.mark.parametrize("about", ["loop", "air", "gap", "limb"])
@@ -47,6 +47,7 @@ def test_confidence_counts_by_its_tenth_percentile():
 def test_what_is_unknown_is_doubtful():
     lines = Skeleton([[0, 0, 0], [1, 0, 0]], [[0, 1]], np.ones(2), (), (), ())
     assert np.isnan(lines.score)
+    assert [reason.code for reason in lines.reasons] == ["unknown score"]
     assert lines.verdict is Verdict.DOUBTFUL
 
 
@@ -61,7 +62,11 @@ def test_skeletons_have_verdicts():
         assert Report.from_dict(skeleton.report.to_dict()) == skeleton.report
     noisy = skeletonize(samples.sauropod(400, noise=0.03).points)
     assert noisy.verdict is Verdict.DOUBTFUL
-    assert noisy.score < 0.8
+    ring = skeletonize(samples.torus(1000).points)
+    unsure = replace(ring, report=replace(ring.report, decisions=(decision("loop", 0.5), decision("limb", 0.6))))
+    (reason,) = unsure.reasons
+    assert (reason.code, reason.place, unsure.verdict) == ("low score", (0.0, 0.0, 0.0), Verdict.DOUBTFUL)
+    assert "the loop at (0, 0, 0) is a handle: 0.50" in reason.text
 
 
 def test_files_of_earlier_versions_have_warnings():

@@ -83,7 +83,7 @@ def _skeletonize(task: Task, row: Row, messages: list[str]) -> None:
     facts = summary(skeleton, 0.0).items()
     row |= {name: None if isinstance(value, float) and not math.isfinite(value) else value for name, value in facts}
     if task.accept and not task.is_tile and not skeleton.verdict.is_at_least(task.accept):
-        why = "; ".join(skeleton.report.warnings) or f"its score is {skeleton.score:.2f}"
+        why = "; ".join(reason.text for reason in skeleton.reasons)
         raise InvalidCloudError(f"the skeleton is not accepted: {skeleton.verdict.value}: {why}")
     for output in task.outputs:
         path = Path(task.out_dir, output)

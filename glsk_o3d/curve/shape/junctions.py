@@ -202,7 +202,8 @@ def limb_line(
     """The straight line through the part of a limb that is undisturbed by others, and nearest to its junction.
 
     Nothing is decided: every place counts by how far it has left the others, from 0 at their surface on, and less and
-    less from two radii on. The half towards the limb's other end counts as undisturbed, whatever is there.
+    less from one undisturbed radius on, to 0 at three. The half towards the limb's other end counts as undisturbed,
+    whatever is there.
     All paths are numbers of `vertices` (M, 3), the limb's from its junction on; the surface is `surface` (M,) away from
     these.
     """
@@ -225,7 +226,7 @@ def limb_line(
         return Line(anchor, np.zeros(3), 0.0, 0.0, start, anchor[None], radius)
     weight /= total
     middle, mean = weight @ middles, weight @ positions
-    direction = (weight * (mean - positions)) @ (middles - middle)
+    direction = (weight * (mean - positions)) @ (middles - middle)  # towards the junction
     direction /= max(np.linalg.norm(direction), TINY)
     off = middles - middle - (mean - positions)[:, None] * direction
     spread, bend = np.sqrt(weight @ (positions - mean) ** 2), np.sqrt(weight @ dot(off, off))
