@@ -121,6 +121,9 @@ MODULES = {
 """The modules that plugins import from."""
 
 
+FOREIGN_BASES = ("object", "str", "BaseException", "tuple", "MeshSet", "Generic")  # whose members no page repeats
+
+
 def names(module):
     """The public functions and classes of a module: those with a task, or else all that it defines."""
     if module in PACKAGES:
@@ -178,7 +181,8 @@ def name_pages():
     for module in (*PACKAGES, *MODULES):
         for name in own(module):
             kind = "class" if inspect.isclass(getattr(importlib.import_module(module), name)) else "function"
-            members = ("   :members:", "   :show-inheritance:") if kind == "class" else ()
+            inherited = f"   :inherited-members: {', '.join(FOREIGN_BASES)}"
+            members = ("   :members:", inherited, "   :show-inheritance:") if kind == "class" else ()
             lines = (*heading(name, "="), f".. currentmodule:: {module}", f".. auto{kind}:: {module}.{name}", *members)
             yield f"{module}.{name}", [*lines, ""]
 
