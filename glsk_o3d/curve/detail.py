@@ -32,7 +32,7 @@ class DetailNumbers:
 DETAIL = DetailNumbers()
 
 
-class Limbs(NamedTuple):
+class JudgedLimbs(NamedTuple):
     """A skeleton with all branches that were pruned, and the decisions about its limbs."""
 
     vertices: np.ndarray  # (n, 3) those of the skeleton, and then those of pruned branches
@@ -41,7 +41,7 @@ class Limbs(NamedTuple):
     judged: dict[int, Decision]  # by the vertex at the end
 
 
-def all_limbs(skeleton: Skeleton) -> Limbs:
+def all_limbs(skeleton: Skeleton) -> JudgedLimbs:
     """A skeleton with its pruned branches, each joined to a vertex near the junction that it left, but no end.
 
     It is that whose ball, of its radius, has the old junction deepest inside. The last branch to be pruned is the first
@@ -61,10 +61,10 @@ def all_limbs(skeleton: Skeleton) -> Limbs:
             vertices, radii = np.concatenate([vertices, places[1:]]), np.r_[radii, limb.radii[1:]]
             inner = np.r_[inner, np.arange(len(places) - 1) < len(places) - 2]
             judged[int(path[-1])] = limb
-    return Limbs(vertices, radii, np.concatenate(edges), judged)
+    return JudgedLimbs(vertices, radii, np.concatenate(edges), judged)
 
 
-def pruning_order(limbs: Limbs) -> Iterator[tuple[Decision, float, list[int]]]:
+def pruning_order(limbs: JudgedLimbs) -> Iterator[tuple[Decision, float, list[int]]]:
     """The branches that leave a junction and end, as paths from there, with their probability, as they go.
 
     The least probable limb goes first. Where two branches are left at a junction they are one from then on: a limb if

@@ -201,24 +201,35 @@ def _nearest(
     along = tangent.take(edge, axis=0)
     across, offset = cross(n, along), places_on_edges(x, ends, edge, t) - p
     miss, distance = dot(across, offset) ** 2, dot(offset, offset) - dot(offset, along) ** 2
-    a, b = ends.T
     aside = offset - dot(offset, along)[:, None] * along
-    facts = [miss, distance, np.full(len(p), 0.5), normal_moments(n, offset), aside[:, ROWS] * aside[:, COLUMNS]]
-    if sides:
-        inward = dot(n, offset)[:, None]
-        facts += [-np.sign(inward) * n, -inward * n, inward**2 * facts[3][:, :6]]
-    sums = group_sum(np.column_stack(facts), edge, len(ends))
-    sums = group_sum(np.concatenate([sums, sums]), np.concatenate([a, b]), len(x))
-    sums = sums + group_sum(sums[np.concatenate([b, a])], np.concatenate([a, b]), len(x))
-    miss_at, apart_at, support = sums[:, :3].T
-    sections = half_axes(sums[:, 3:15], radii)
-    apart_at = np.maximum(apart_at, 0)  # but for rounding, a difference of squares
+    moments = normal_moments(n, offset)
+    facts = dict(miss=miss, distance=distance, half=np.full(len(p), 0.5), moments=moments)
+    facts["products"] = aside[:, ROWS] * aside[:, COLUMNS]
+    inward = dot(n, offset)[:, None]
+    signed = [-np.sign(inward) * n, -inward * n, inward**2 * moments[:, :6]] if sides else [np.empty((len(p), 0))]
+    facts["outward"] = np.column_stack(signed)
+    sums = _around_every_vertex(facts, edge, ends, len(x))
+    support, distance = sums["half"][:, 0], np.maximum(sums["distance"][:, 0], 0)  # rounded, a difference of squares
+    sections = half_axes(sums["moments"], radii)
     # normals that point anywhere explain half of the distance; without points there is nothing but doubt
-    doubt = np.where(apart_at > 0, np.minimum(2 * miss_at, apart_at) / np.maximum(apart_at, TINY), 1)
+    explained = np.minimum(2 * sums["miss"][:, 0], distance) / np.maximum(distance, TINY)
+    doubt = np.where(distance > 0, explained, 1)
     # normals of a sheet as thin as its points are apart say nothing of its width, and there is nothing but doubt
-    spread = _spread_width(sums[:, 15:21] / np.maximum(2 * support, TINY)[:, None])
+    spread = _spread_width(sums["products"] / np.maximum(2 * support, TINY)[:, None])
     width = sections.half_width + doubt * np.maximum(FIT.spread * spread - sections.half_width, 0)
-    return _Nearest(edge, share, tangent, across, offset, doubt, support, sections, width, sums[:, 3:9], sums[:, 21:])
+    faces = sums["moments"][:, :6]
+    return _Nearest(edge, share, tangent, across, offset, doubt, support, sections, width, faces, sums["outward"])
+
+
+def _around_every_vertex(facts: dict[str, np.ndarray], edge: Ints, ends: Ints, m: int) -> dict[str, np.ndarray]:
+    """Sums of facts of points on edges, over all edges at each vertex and at its neighbours, (m, columns) each."""
+    columns = [values.reshape(len(edge), -1) for values in facts.values()]
+    a, b = ends.T
+    sums = group_sum(np.concatenate(columns, axis=1), edge, len(ends))
+    sums = group_sum(np.concatenate([sums, sums]), np.concatenate([a, b]), m)
+    sums = sums + group_sum(sums[np.concatenate([b, a])], np.concatenate([a, b]), m)
+    stops = np.cumsum([values.shape[1] for values in columns])[:-1]
+    return dict(zip(facts, np.split(sums, stops, axis=1), strict=True))
 
 
 def _pull(near: _Nearest) -> np.ndarray:

@@ -37,10 +37,12 @@ BRIDGE_SAMPLES = np.arange(1, 8)[:, None] / 8  # derived: places along a bridge,
 
 
 class _End(NamedTuple):
+    """An end of the curve, in the units of the cloud."""
+
     leaf: int
     place: np.ndarray
-    outward: np.ndarray
-    radius: float
+    outward: np.ndarray  # unit vector, on along the branch
+    radius: float  # median of the branch
 
 
 class Gaps(Question):
@@ -84,9 +86,8 @@ def gap_facts(evidence: Evidence) -> Iterator[tuple[tuple[int, int], dict[str, f
     typical = quantile(evidence.winding)
     if typical < CURVE.inside:
         return  # parts too thin to have an inside, which could go on across a gap
-    leaves = [end.leaf for end in ends]
-    along = dijkstra(linked(curve.vertices, curve.edges), indices=leaves)
-    bridges = [(end, other) for i, end in enumerate(ends) for other in _aims(curve, end, along[i], leaves, along)]
+    travelled = dijkstra(linked(curve.vertices, curve.edges), indices=[end.leaf for end in ends])
+    bridges = [(end, other) for i, end in enumerate(ends) for other in _aims(curve, ends, i, travelled)]
     if not bridges:
         return
     across = [curve.vertices[other] - end.place for end, other in bridges]
@@ -100,22 +101,33 @@ def gap_facts(evidence: Evidence) -> Iterator[tuple[tuple[int, int], dict[str, f
         yield (end.leaf, other), facts
 
 
-def _aims(curve: Curve, end: _End, travelled: np.ndarray, leaves: list[int], along: np.ndarray) -> Iterator[int]:
-    """Vertices that an end points at across a gap: the nearest other end, and the nearest place else."""
+def _aims(curve: Curve, ends: list[_End], i: int, travelled: np.ndarray) -> Iterator[int]:
+    """Vertices that end i points at across a gap: the nearest other end, and the nearest place else.
+
+    `travelled` (e, M) are the lengths along the curve from every end to every vertex.
+    """
+    end, leaves = ends[i], [other.leaf for other in ends]
     across = curve.vertices - end.place
     away = np.maximum(norm(across), TINY)
     cosine = across @ end.outward / away
-    free = curve.degree == 1
-    gap = away - np.where(free, 0, curve.radii)
-    aims = (gap < GAPS.reach * end.radius) & (cosine > GAPS.cosine) & (curve.degree > 0)
-    aims &= travelled > GAPS.detour * away
-    cost = gap + away * (1 - cosine) / 2
-    # what the way by an end leads to is behind it, and not asked for itself
-    behind = ((away[leaves][:, None] + along)[aims[leaves]] < GAPS.detour * away).any(axis=0)
-    for kind in (free, ~free & ~behind):
+    is_end = curve.degree == 1
+    empty = away - np.where(is_end, 0, curve.radii)  # of the way across, what is outside of the curve's ball there
+    is_near = (empty < GAPS.reach * end.radius) & (cosine > GAPS.cosine) & (curve.degree > 0)
+    aims = is_near & _is_detour(travelled[i], away)
+    # a place that is reached by way of another end lies behind that end, and is not asked for itself
+    by_ends = (away[leaves][:, None] + travelled)[aims[leaves]]
+    behind = ~_is_detour(by_ends, away).all(axis=0)
+    cost = empty + away * (1 - cosine) / 2
+    for kind in (is_end, ~is_end & ~behind):
         rows = np.flatnonzero(aims & kind)
         if len(rows):
             yield int(rows[np.argmin(cost[rows])])
+
+
+def _is_detour(length: np.ndarray, away: np.ndarray) -> np.ndarray:
+    """Whether a way of some length is long for how far away its end is."""
+    detour: np.ndarray = length > GAPS.detour * away
+    return detour
 
 
 def _cap(end: _End, surface: Surface) -> float:
