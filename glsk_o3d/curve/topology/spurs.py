@@ -127,13 +127,13 @@ def _facts(
         # by how far they are, and not as they come, which depends on how the object is turned
         points = own[np.argsort(norm(own - curve.vertices[junction]))][:: len(own) // LIMB.points + 1]
         out = max(_standing_out(limbs, k, junction, points, ending), 0.0) if own_half > 0 else 0.0
-        thickness = np.average(radius[part], weights=count[part]) / max(distance[junction], TINY)
-        ratio = np.clip(thickness, LIMB.slenderest, LIMB.stoutest)
+        own_radius = np.average(radius[part], weights=count[part])
+        ratio = own_radius / max(distance[junction], own_radius / LIMB.stoutest, TINY)
         protrusion = float(np.log(out / max(own_half, TINY) + LIMB.least_out))
         yield dict(
             protrusion=protrusion - float(shared) * max(protrusion, 0),
             certainty=-float(np.log1p(-np.average(confidence[body], weights=count[body]))),
-            slenderness=-float(np.log(ratio)),
+            slenderness=-float(np.log(max(ratio, LIMB.slenderest))),
         )
 
 
