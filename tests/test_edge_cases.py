@@ -1,4 +1,4 @@
-"""The table of edge cases, over skeletonize with every named pipeline and over every filter."""
+"""The table of edge cases, over skeletonize with every named pipeline, and so over every filter of one."""
 
 import warnings
 from dataclasses import replace

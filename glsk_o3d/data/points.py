@@ -241,10 +241,15 @@ class Points(WorkingCloud):
         row_of_point = np.where(aside, self.map.to_points(nearest), points.map.row_of_point)
         return replace(points, map=replace(points.map, row_of_point=row_of_point, outlier=self.outlier | aside))
 
-    def check_whole(self, filter: Any) -> None:
-        """Raise StageError if they were thinned: the filter needs all of them."""
+    def check_not_thinned(self, filter: Any) -> None:
+        """Raise StageError if points were merged: the filter needs all of them."""
         if len(self) < len(self.cloud):
             raise StageError(f"{type(filter).__name__} comes before Thinner, which has merged points already")
+
+    def check_not_moved(self, filter: Any) -> None:
+        """Raise StageError if points were moved: the filter measures anew where they were."""
+        if len(self.cloud) and not (self.frame.into(self.points[self.map.point_of_row]) == self.cloud).all():
+            raise StageError(f"{type(filter).__name__} comes before Denoiser, which has moved points already")
 
     def with_rows(self, row: np.ndarray, cloud: np.ndarray, neighbours: np.ndarray, **changes: Any) -> Points:
         """These with new rows: `row` (m,) is the new row of each old one. Neighbourhoods are measured anew.

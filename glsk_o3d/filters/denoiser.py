@@ -68,7 +68,7 @@ class Denoiser(Filter[Points, Points]):
     def run(self, points: Points, context: RunContext) -> Points:
         if not self.denoise:
             return points
-        points.check_whole(self)
+        points.check_not_thinned(self)
         return to_ridges(averaged(points), self.denoise)
 
 

@@ -70,7 +70,8 @@ class OutlierRemover(Filter[Points, Points]):
     def run(self, points: Points, context: RunContext) -> Points:
         if not self.outlier_factor:
             return points
-        points.check_whole(self)
+        points.check_not_thinned(self)
+        points.check_not_moved(self)
         cloud, weight, neighbours, factor = points.cloud, points.weight, points.neighbours, self.outlier_factor
         distance = mean_distances(cloud, neighbours)
         mixed, doubtful = mixed_pixels(points, distance, factor)

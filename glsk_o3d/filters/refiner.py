@@ -116,7 +116,8 @@ class Refiner(Filter[Skeleton, Skeleton]):
     def _refined(self, curve: Curve) -> Curve:
         curve, surface = self.fitted(curve)
         deferred = None
-        if _may_be_asked(curve) and (self.recentre or self.handle or self.limb or self.air or self.bridge):
+        asks = self.recentre or any(self._least(question.about) for question in QUESTIONS)
+        if asks and _may_be_asked(curve):
             curve, surface, deferred = self._decided(curve, surface.oriented(curve))
         if self.recentre and len(curve.vertices):
             curve = fit_axis(level_wide_ends(curve, surface), self.recentre + 1, surface, settle=True)

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from glsk_o3d import OutlierRemover, RingBuilder, Sampler, samples
+from glsk_o3d import Denoiser, OutlierRemover, RingBuilder, Sampler, StageError, samples
 from glsk_o3d.filters.outlier_remover import inliers
 from glsk_o3d.geometry.grid_sampling import sample_grid
 from glsk_o3d.geometry.neighbourhoods import mean_distances, nearest_neighbours
@@ -121,3 +121,10 @@ def test_twigs_and_noise_are_no_mixed_pixels():
     """Where little of a cloud is a surface, sparse points are parts of it."""
     for shape in (samples.tree(4096, forks=6, seed=1), samples.torus(4000, noise=0.03)):
         assert STRICT(shape.points).report.n_mixed == 0
+
+
+def test_points_that_were_moved_are_refused():
+    """Their places would come back: neighbourhoods are measured anew where the points were."""
+    tube = samples.tube(2000, noise=0.02).points
+    with pytest.raises(StageError, match="OutlierRemover comes before Denoiser"):
+        (Sampler(size="all") | Denoiser() | OutlierRemover(outlier_factor=1.5))(tube)

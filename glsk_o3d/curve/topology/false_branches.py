@@ -54,7 +54,7 @@ class FalseBranches(Question):
         for branch, k, facts in branch_facts(evidence):
             weakest, probability = branch[k : k + 2], logistic(self.weights, facts)
             place = evidence.curve.vertices[weakest].mean(axis=0)
-            answers.append(Candidate(np.sort(weakest), place, facts, probability, probability >= least))
+            answers.append(Candidate(np.sort(weakest), place, facts, probability, self.changes(probability, least)))
         return answers
 
     def change(self, evidence: Evidence, chosen: Sequence[Candidate]) -> Curve:

@@ -62,7 +62,7 @@ class Gaps(Question):
             if used.isdisjoint(pair):
                 used.update(pair)
                 place = evidence.curve.vertices[list(pair)].mean(axis=0)
-                answers.append(Candidate(sorted(pair), place, facts, probability, probability >= least))
+                answers.append(Candidate(sorted(pair), place, facts, probability, self.changes(probability, least)))
         return answers
 
     def change(self, evidence: Evidence, chosen: Sequence[Candidate]) -> Curve:

@@ -82,7 +82,7 @@ class Loops(Question):
                     loop = loop.without_normals()
                 probability = logistic(self.weights, loop.facts) * loop.certainty
                 part = cycles[i], narrow[i], loop.weakest
-                answers[i] = Candidate(part, loop.centre, loop.facts, probability, probability < least)
+                answers[i] = Candidate(part, loop.centre, loop.facts, probability, self.changes(probability, least))
                 if answers[i].changes:
                     used |= members[i]
             remaining = [i for i in waiting if used.isdisjoint(members[i])]

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...data.decisions import Decision
+from ...data.decisions import WORDS, Decision
 from ..curve import Curve
 from ..surface import Evidence, Surface
 
@@ -41,6 +41,10 @@ class Question:
     about: ClassVar[str]  # as in `Decision`
     weights: ClassVar[Mapping[str, float]]  # of the facts, and of a constant
     repeats: ClassVar[bool]  # whether it is asked again of a changed curve
+
+    def changes(self, probability: float, least: float) -> bool:
+        """Whether the graph is changed where the probability is this and `least` decides."""
+        return (probability >= least) == WORDS[self.about].changes_from
 
     def candidates(self, evidence: Evidence, least: float) -> Sequence[Candidate]:
         """The parts that are asked about, with the answers; `least` is the probability that decides."""
