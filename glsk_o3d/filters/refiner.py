@@ -111,7 +111,8 @@ class Refiner(Filter[Skeleton, Skeleton]):
         return (without_detached_clumps(refined) if self.air and self.bridge else refined).to_skeleton()
 
     def _in_order(self, curve: Curve) -> Curve:
-        return on_points(self._refined, curve, along_a_morton_curve(curve))
+        has_copies = curve.report.n_distinct < curve.report.n_sampled
+        return on_points(self._refined, curve, along_a_morton_curve(curve, distinct=has_copies))
 
     def _refined(self, curve: Curve) -> Curve:
         curve, surface = self.fitted(curve)
