@@ -1,7 +1,8 @@
 """The armature of a skeleton for animation: its joints, and the bones that move each point of a surface."""
 
+import heapq
 import itertools
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -9,45 +10,137 @@ from scipy.sparse import csr_array
 from ..curve.merging import merge_into
 from ..curve.rooted import numbered_from
 from ..data.skeleton import Skeleton
-from ..geometry.groups import group_rank
-from ..geometry.polylines import arc_lengths, incident_edges, nearest_on_edges, place_at
-from ..geometry.vectors import TINY, norm
+from ..errors import InvalidParameterError
+from ..geometry.polylines import arc_lengths, chord_distances, incident_edges, nearest_on_edges, place_at
+from ..geometry.vectors import TINY, Floats, norm
+from .mirror import Plane, mirrored_branches
 
 MOST_WEIGHTS = 4  # published: glTF 2.0, 3.7.3.3, joints of a vertex in one set
 BLEND = 1.5  # fitted: radii beyond its end at which a bone ceases to move a tube; with 1 a bent elbow has a dent
 JOINTS_BETWEEN = 3  # derived: from the bone beyond a limb's root over the trunk's joint to that beyond another's
+CLOSEST_JOINTS = 0.5  # fitted: radii between joints whose number is given
+LONG_BONE = 0.07  # fitted: of the length of the shorter part, which counts as much as the distance of a bend
 MOST_PRODUCTS = 10**8  # speed: a second's; only where thousands of bones meet are there more
 
 
-def armature(forest: Skeleton) -> Skeleton:
+class _MirroredSet(NamedTuple):
+    """Branches that have joints in the same places: one, or two that are mirror images of each other."""
+
+    rows: list[int]
+    centred: bool
+    curve: Floats  # of the first, through its vertices, as far as it and its mirror image agree
+    radii: Floats
+
+
+def armature(forest: Skeleton, joints: int | None = None, plane: Plane | None = None) -> Skeleton:
     """The same forest with joints that can bend: none is nearer to another than the radius there.
 
     Junctions inside the ball of a thicker one share its joint. Each limb begins there, on the axis of the trunk, and
     has its next joint where it leaves the junction's ball, a pair of limbs equally far from it. Unknown radii count as
     0: then all vertices are joints. Vertex 0 stays the root, and numbers lead outwards.
+
+    If a number of `joints` is given, these are the root, the ends and the junctions, and then the places that tell most
+    of the curve: the farthest bends and the middles of long bones. With a `plane` of symmetry, joints of two branches
+    that are mirror images of each other are, too, and those of a branch that is its own image are in the plane.
     """
     whole, root = _without_junctions_in_balls(forest)
-    radii, ends = np.nan_to_num(whole.radii), whole.degree != 2
+    sets, ends = _mirrored_sets(whole, plane), whole.degree != 2
+    lengths = _lengths_by_radius(whole, sets, root) if joints is None else _telling_lengths(whole, sets, root, joints)
     joint = np.where(ends, np.cumsum(ends) - 1, -1)  # of each vertex
-    places, joint_radii, edges, n = (
-        [whole.vertices[ends]],
-        [whole.radii[ends]],
-        [np.empty((0, 2), int)],
-        int(ends.sum()),
-    )
-    for path in whole.branches:
-        lengths = arc_lengths(whole.vertices[path])
-        at = _joints_along(whole.vertices[path], radii[path], whole.degree[path[[0, -1]]] > 2, path == root)
-        number = np.concatenate([joint[path[:1]], n + np.arange(len(at) - 2), joint[path[-1:]]])
-        joint[path[1:-1]] = number[np.searchsorted((at[1:] + at[:-1]) / 2, lengths[1:-1])]
-        places.append(place_at(whole.vertices[path], lengths, at[1:-1]))
-        joint_radii.append(np.interp(at[1:-1], lengths, whole.radii[path]))
-        edges.append(np.sort(np.column_stack([number[:-1], number[1:]]), axis=1))
-        n += len(at) - 2
+    end_places = whole.vertices.copy()
+    places, radii, edges, n = [], [whole.radii[ends]], [np.empty((0, 2), int)], int(ends.sum())
+    for each, at in sorted(zip(sets, lengths, strict=True), key=lambda pair: (pair[0].centred, len(pair[0].rows))):
+        along = arc_lengths(each.curve)
+        inner = np.concatenate([each.curve[[0, -1]], place_at(each.curve, along, at[1:-1])])
+        for row in each.rows:
+            path = whole.branches[row]
+            own = arc_lengths(whole.vertices[path])
+            number = np.concatenate([joint[path[:1]], n + np.arange(len(at) - 2), joint[path[-1:]]])
+            middles = (at[1:] + at[:-1]) / 2 / max(along[-1], TINY)
+            joint[path[1:-1]] = number[np.searchsorted(middles, own[1:-1] / max(own[-1], TINY))]
+            shown = inner if plane is None or row == each.rows[0] else plane.mirrored(inner)
+            end_places[path[[0, -1]]] = shown[:2]  # branches in the plane come last and put their ends there
+            places.append(shown[2:])
+            radii.append(np.interp(at[1:-1], along, each.radii))
+            edges.append(np.sort(np.column_stack([number[:-1], number[1:]]), axis=1))
+            n += len(at) - 2
     vertex = np.append(joint, -1)[whole.vertex_of_point]
-    joints, radii = np.concatenate(places), np.concatenate(joint_radii)
-    jointed = Skeleton(joints, np.concatenate(edges), radii, vertex, whole.points, whole.normals)
+    all_places = np.concatenate([end_places[ends], *places])
+    jointed = Skeleton(all_places, np.concatenate(edges), np.concatenate(radii), vertex, whole.points, whole.normals)
     return numbered_from(jointed, int(joint[root]))
+
+
+def _mirrored_sets(skeleton: Skeleton, plane: Plane | None) -> list[_MirroredSet]:
+    """All branches, each alone, or with its mirror image in a plane."""
+    curves, radii = ([values[path] for path in skeleton.branches] for values in (skeleton.vertices, skeleton.radii))
+    if plane is None:
+        return [_MirroredSet([row], False, *both) for row, both in enumerate(zip(curves, radii, strict=True))]
+    sets = []
+    for row, other in enumerate(mirrored_branches(skeleton, plane).tolist()):
+        curve, radius = curves[row], radii[row]
+        if other >= row:
+            share, lengths = arc_lengths(curve), arc_lengths(curves[other])
+            share *= lengths[-1] / max(share[-1], TINY)
+            curve = (curve + plane.mirrored(place_at(curves[other], lengths, share))) / 2
+            radius = (radius + np.interp(share, lengths, radii[other])) / 2
+        if other >= row or other < 0:
+            sets.append(_MirroredSet([row, other] if other > row else [row], other == row, curve, radius))
+    return sets
+
+
+def _lengths_by_radius(skeleton: Skeleton, sets: list[_MirroredSet], root: int) -> list[np.ndarray]:
+    """Lengths along the curves of sets of branches of joints that are a radius apart."""
+    lengths = []
+    for each in sets:
+        path = skeleton.branches[each.rows[0]]
+        forks = skeleton.degree[path[[0, -1]]] > 2
+        lengths.append(_joints_along(each.curve, np.nan_to_num(each.radii), forks, path == root))
+    return lengths
+
+
+def _telling_lengths(skeleton: Skeleton, sets: list[_MirroredSet], root: int, joints: int) -> list[np.ndarray]:
+    """Lengths along the curves of sets of branches of the joints that tell most of the curve, so many in all."""
+    chosen = [
+        sorted({0, len(each.curve) - 1, *np.flatnonzero(skeleton.branches[each.rows[0]] == root).tolist()})
+        for each in sets
+    ]
+    n = int(np.union1d(np.flatnonzero(skeleton.degree != 2), [root]).size)
+    if joints < n:
+        raise InvalidParameterError(
+            f"joints = {joints}: the skeleton has {n} ends and junctions, the root among them; drop branches first "
+            "(editing.prune, --prune-length), or ask for more"
+        )
+    queue: list[tuple[float, int, int, int, int]] = []
+
+    def offer(number: int, first: int, last: int) -> None:
+        weight, place = _telling_place(sets[number].curve, sets[number].radii, first, last)
+        if weight > 0:
+            heapq.heappush(queue, (-weight, number, first, place, last))
+
+    for number, rows in enumerate(chosen):
+        for first, last in itertools.pairwise(rows):
+            offer(number, first, last)
+    while queue and n < joints:
+        _, number, first, place, last = heapq.heappop(queue)
+        if n + len(sets[number].rows) <= joints:
+            n += len(sets[number].rows)
+            chosen[number].append(place)
+            offer(number, first, place)
+            offer(number, place, last)
+    return [arc_lengths(each.curve)[sorted(rows)] for each, rows in zip(sets, chosen, strict=True)]
+
+
+def _telling_place(curve: np.ndarray, radii: np.ndarray, first: int, last: int) -> tuple[float, int]:
+    """The place of a curve between two others where a joint tells most of it, and how much, as a length.
+
+    That is its distance from the chord (Douglas and Peucker 1973), and a share of the length of the shorter part.
+    """
+    inner, lengths = slice(first + 1, last), arc_lengths(curve)
+    distance = chord_distances(curve[first : last + 1])[1:-1]
+    shorter = np.minimum(lengths[inner] - lengths[first], lengths[last] - lengths[inner])
+    weight = np.where(shorter >= CLOSEST_JOINTS * np.nan_to_num(radii[inner]), distance + LONG_BONE * shorter, 0)
+    place = int(weight.argmax()) if last - first > 1 else 0
+    return float(weight[place]) if last - first > 1 else 0.0, first + 1 + place
 
 
 def _without_junctions_in_balls(forest: Skeleton) -> tuple[Skeleton, int]:
@@ -161,10 +254,3 @@ def bone_before(forest: Skeleton) -> np.ndarray:
     leading = np.full(len(forest.vertices), -1)
     leading[forest.edges[:, 1]] = np.arange(len(forest.edges))
     return leading[forest.edges[:, 0]]
-
-
-def bone_names(forest: Skeleton) -> list[str]:
-    """Names of the bones, of their branch and their number on it."""
-    branch = forest.branch_of_edge
-    numbers = group_rank(branch, len(forest.branches)).tolist()
-    return [f"branch_{label}.{number:03d}" for label, number in zip(branch.tolist(), numbers, strict=True)]

@@ -89,14 +89,16 @@ def rig(
     skeleton: SkeletonFile,
     output: Annotated[Path, output_option("FILE", "The rig: glb.")],
     mesh: Annotated[Path | None, argument("MESH", "A mesh or a cloud; by default the skeleton's tubes.")] = None,
+    joints: Annotated[int | None, option("N", "How many joints: ends, junctions, then bends.", min=2)] = None,
+    symmetric: Annotated[bool, Option("--symmetric", help="Joints left and right are mirror images.")] = False,
     root: Annotated[Any, root_option("Which joint moves all others")] = None,
     cut_loops: Annotated[bool, Option("--cut-loops", help="Cut loops open; the surface stays whole.")] = False,
     up: Annotated[str, option("AXIS", "Which axis of the data points up: z or y.")] = "z",
 ) -> None:
     """Write a mesh with the skeleton's armature, for Blender.
 
-    Joints are at the junctions, where limbs leave them, and along the limbs, at least a radius apart. Bones are named
-    by their branch and move what is next to them. Textures do not go along.
+    Joints are at the junctions, where limbs leave them, and along the limbs, at least a radius apart. Limbs of bipeds
+    and quadrupeds have names, other bones those of their branch. They move what is next to them along the surface.
     """
     from .. import FileFormatError, read_cloud, read_skeleton, save_rig
     from ..io.formats.gltf import RIG_ENDING
@@ -110,5 +112,5 @@ def rig(
             surface = read_mesh(mesh)
         except FileFormatError:
             surface = read_cloud(mesh)  # knows best what else may be wrong with the file
-    bones = save_rig(curve, output, surface, cut_loops=cut_loops, root=root, up=up)
+    bones = save_rig(curve, output, surface, joints=joints, symmetric=symmetric, cut_loops=cut_loops, root=root, up=up)
     print_result({}, lambda: echo(f"{len(bones.edges)} bones"), {output: ""})

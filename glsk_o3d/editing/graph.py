@@ -17,8 +17,8 @@ from ..data.graph import all_of_vertices
 from ..data.skeleton import Skeleton, check_skeleton, of_input
 from ..errors import InvalidParameterError
 from ..geometry.near_links import linked
-from ..geometry.polylines import arc_lengths
-from ..geometry.vectors import TINY, norm
+from ..geometry.polylines import arc_lengths, chord_distances
+from ..geometry.vectors import norm
 from ..parameters import check_number
 
 Edit = TypeVar("Edit", bound=Callable[..., Skeleton])
@@ -288,9 +288,7 @@ def _significance(curve: np.ndarray) -> np.ndarray:
         first, last = parts.pop()
         if last - first < 2:
             continue
-        offset, chord = curve[first + 1 : last] - curve[first], curve[last] - curve[first]
-        along = np.clip(offset @ chord / max(chord @ chord, TINY), 0, 1)
-        distance = norm(offset - along[:, None] * chord)
+        distance = chord_distances(curve[first : last + 1])[1:-1]
         farthest = first + 1 + int(distance.argmax())
         # no more than that of the ends of its part, without which it would not be asked
         significance[farthest] = min(float(distance.max()), significance[first], significance[last])

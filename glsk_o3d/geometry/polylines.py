@@ -47,6 +47,13 @@ def place_at(path: np.ndarray, lengths: np.ndarray, length: float | np.ndarray) 
     return np.stack([np.interp(length, lengths, column) for column in path.T], axis=-1)
 
 
+def chord_distances(curve: np.ndarray) -> Floats:
+    """Distance of every place of a curve (p, 3) from the straight piece between its ends, (p,) float array."""
+    offset, chord = curve - curve[0], curve[-1] - curve[0]
+    along = np.clip(offset @ chord / max(chord @ chord, TINY), 0, 1)
+    return norm(offset - along[:, None] * chord)
+
+
 def relative_distance(
     points: np.ndarray, vertices: np.ndarray, surface: np.ndarray, paths: Sequence[np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:

@@ -7,6 +7,7 @@ from scipy.spatial import cKDTree
 from glsk_o3d import Skeleton, samples
 from glsk_o3d.analysis.rigging import MOST_WEIGHTS, armature, bone_before, skin_weights
 from glsk_o3d.analysis.segmentation import vertex_of_cloud
+from glsk_o3d.errors import InvalidParameterError
 from glsk_o3d.io.formats.graphs import as_forest
 
 
@@ -101,3 +102,19 @@ def test_behind_a_joint_a_bone_that_points_away_moves_less():
     assert beside == pytest.approx(1 / 3)
     assert behind == pytest.approx(share / (2 + share))
     assert behind < 0.3
+
+
+def test_a_number_of_joints_goes_to_ends_junctions_bends_and_long_bones():
+    arm = [[x, 0, 0] for x in range(1, 11)] + [[10, y, 0] for y in range(1, 7)]  # an elbow at x = 10
+    others = [[0, 0, z] for z in range(1, 13)], [[-x, 0, 0] for x in range(1, 3)]
+    nodes = np.array([[0, 0, 0], *arm, *others[0], *others[1]], float)
+    edges = [(i, i + 1) for i in range(len(nodes) - 1) if i not in (16, 28)] + [(0, 17), (0, 29)]
+    forest = bare(nodes, edges, np.full(len(nodes), 0.1))
+    first = np.array([[0, 0, 0], [10, 6, 0], [0, 0, 12], [-2, 0, 0]])
+    for joints, more in ((4, []), (5, [[10, 0, 0]]), (7, [[10, 0, 0], [0, 0, 6], [5, 0, 0]])):
+        bones = armature(forest, joints)
+        assert sorted(bones.vertices.tolist()) == sorted([*first.tolist(), *more])
+        assert bones.vertices[0].tolist() == forest.vertices[0].tolist()
+    assert len(armature(forest, 1000).vertices) == len(forest.vertices)
+    with pytest.raises(InvalidParameterError, match=r"joints = 3.*has 4 ends and junctions"):
+        armature(forest, 3)

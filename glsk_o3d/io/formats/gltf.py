@@ -10,7 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.rigging import armature, bone_before, bone_names, skin_weights
+from ...analysis.limb_names import bone_names
+from ...analysis.mirror import mirror_plane
+from ...analysis.rigging import armature, bone_before, skin_weights
 from ...analysis.segmentation import vertex_of_cloud
 from ...curve.rooted import RootPlace
 from ...data.skeleton import Skeleton
@@ -18,6 +20,7 @@ from ...errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ...geometry.vectors import norm, unit
 from ...interop.atomic import check_ending, write_atomically
 from ...interop.clouds import open3d_class, surface_mesh
+from ...parameters import check_number
 from ..geometry import to_tubes
 from .graphs import as_forest, global_shift, holding_all
 
@@ -38,6 +41,8 @@ def save_rig(
     path: str | os.PathLike[str],
     mesh: Any = None,
     *,
+    joints: int | None = None,
+    symmetric: bool = False,
     cut_loops: bool = False,
     root: RootPlace | None = None,
     up: str = "z",
@@ -45,7 +50,8 @@ def save_rig(
     """Write a mesh or a cloud with a skeleton's armature that moves it, as glTF.
 
     Joints are the junctions, the places where limbs leave a junction's ball, and vertices between that are a radius
-    apart or more. Each edge between joints is a bone, which turns about the end nearer to the root.
+    apart or more. Each edge between joints is a bone, which turns about the end nearer to the root. Limbs of a biped or
+    quadruped have names: head, neck, spine, tail, and arm_left, leg_left, front_leg_left, hind_leg_right and so on.
 
     Parameters
     ----------
@@ -54,6 +60,12 @@ def save_rig(
         Ends in ``.glb``.
     mesh : triangle mesh or cloud, optional
         Of Open3D, or anything that carries points. By default the skeleton's tubes, or if it has no radii, its points.
+    joints : int, optional
+        How many joints, ends of limbs among them: the junctions and ends first, then the farthest bends and the middles
+        of long bones.
+    symmetric : bool
+        Joints of limbs that are mirror images of each other are, too, those in the plane of symmetry are exactly there,
+        and names of mirrored bones end in ``_left`` and ``_right``. The plane is that of the points.
     cut_loops : bool
         Cut loops of the skeleton open instead of refusing them; the surface stays whole.
     root : str, int or (x, y, z), optional
@@ -71,8 +83,9 @@ def save_rig(
     FileFormatError
         The skeleton has loops, or no edges; or the ending is another.
     InvalidCloudError
+        The surface has another size or place than the skeleton.
     InvalidParameterError
-        There is no such axis.
+        There is no such axis; the root is outside of the cloud; or there are more ends and junctions than `joints`.
 
     Examples
     --------
@@ -88,16 +101,25 @@ def save_rig(
     check_ending(path, "rig is glTF", RIG_ENDING)
     if up not in UPRIGHT:
         raise InvalidParameterError(f"up = {up!r}: must be one of {', '.join(UPRIGHT)}")
+    check_number("joints", joints, "int?", low=2)
     with holding_all(path):
-        bones = armature(as_forest(skeleton, cut_loops, root))
-        data = _content(bones, _surface(skeleton) if mesh is None else mesh, up)
+        forest = as_forest(skeleton, cut_loops, root)
+        if len(forest.edges) == 0:
+            raise FileFormatError("the skeleton has no edges: there are no bones to make an armature of")
+        plane = mirror_plane(skeleton.points if len(skeleton.points) else skeleton.vertices)
+        bones = armature(forest, joints, plane if symmetric else None)
+        data = _content(
+            bones, _surface(skeleton) if mesh is None else mesh, up, bone_names(bones, plane, up, symmetric)
+        )
     write_atomically(path, lambda temporary: temporary.write_bytes(data))
     return bones
 
 
 def write(forest: Skeleton) -> bytes:
     """The content of a GLB file: the tubes of a skeleton that is numbered from its roots outwards, and its armature."""
-    return _content(forest, _surface(forest), "z")
+    if len(forest.edges) == 0:
+        raise FileFormatError("the skeleton has no edges: there are no bones to make an armature of")
+    return _content(forest, _surface(forest), "z", bone_names(forest))
 
 
 def _surface(skeleton: Skeleton) -> Any:
@@ -108,10 +130,8 @@ def _surface(skeleton: Skeleton) -> Any:
     return skeleton.points[skeleton.vertex_of_point >= 0]
 
 
-def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
+def _content(forest: Skeleton, mesh: Any, up: str, names: list[str]) -> bytes:
     """The content of a GLB file."""
-    if len(forest.edges) == 0:
-        raise FileFormatError("the skeleton has no edges: there are no bones to make an armature of")
     if len(forest.edges) > MOST_JOINTS:
         raise FileFormatError(f"glTF counts at most {MOST_JOINTS} bones, not {len(forest.edges)}: simplify it first")
     mesh = mesh.to_legacy() if open3d_class(mesh) in (("PointCloud", True), ("TriangleMesh", True)) else mesh
@@ -136,7 +156,7 @@ def _content(forest: Skeleton, mesh: Any, up: str) -> bytes:
     primitive: dict[str, Any] = {"attributes": attributes, "mode": POINTS_MODE}
     if len(triangles):
         primitive |= {"indices": array(triangles.reshape(-1), "<u4"), "mode": TRIANGLES_MODE}
-    joints, places = _joints(forest, origin)
+    joints, places = _joints(forest, origin, names)
     at_rest = np.tile(np.eye(4), (len(places), 1, 1))  # glTF has matrices by columns
     at_rest[:, 3, :3] = -places
     x, y, z = origin.tolist()
@@ -182,12 +202,12 @@ def _looks(mesh: Any, n: int) -> dict[str, np.ndarray]:
     return looks
 
 
-def _joints(forest: Skeleton, origin: np.ndarray) -> tuple[list[dict[str, Any]], np.ndarray]:
+def _joints(forest: Skeleton, origin: np.ndarray, names: list[str]) -> tuple[list[dict[str, Any]], np.ndarray]:
     """The joints, one per edge, each placed relative to the one before; and their places relative to the origin."""
     places, parent = forest.vertices[forest.edges[:, 0]] - origin, bone_before(forest)
     steps = np.where((parent >= 0)[:, None], places - places[parent], places)
     joints: list[dict[str, Any]] = [
-        {"name": name, "translation": step} for name, step in zip(bone_names(forest), steps.tolist(), strict=True)
+        {"name": name, "translation": step} for name, step in zip(names, steps.tolist(), strict=True)
     ]
     for child, bone in enumerate(parent.tolist()):
         if bone >= 0:
