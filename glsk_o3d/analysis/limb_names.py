@@ -59,20 +59,23 @@ def _limbs(bones: Skeleton, partner: np.ndarray, up: str) -> tuple[dict[int, str
     centred = partner == rows
     spine = np.union1d(starts[centred], ends[centred])
     trunk = np.isin(starts, spine) | (starts == starts[partner])
-    pairs = [(row, int(partner[row])) for row in np.flatnonzero((partner > rows) & trunk)]
-    legs = [pair for pair in pairs if lowest[[*pair]].max() < z.min() + LOW * size]
+    pairs = [(row, int(partner[row])) for row in np.flatnonzero((partner > rows) & trunk).tolist()]
+    legs = [pair for pair in pairs if lowest[list(pair)].max() < z.min() + LOW * size]
     length = np.bincount(bones.branch_of_edge, bones.edge_lengths, len(rows))
-    arms = [pair for pair in pairs if pair not in legs and length[[*pair]].min() > LEAST_ARM * size]
-    tips = np.array([row for row in np.flatnonzero(bones.degree[ends] == 1) if _is_outside(bones, row, ends[row])], int)
+    arms = [pair for pair in pairs if pair not in legs and length[list(pair)].min() > LEAST_ARM * size]
+    tips = np.flatnonzero(bones.degree[ends] == 1)
+    tips = tips[[_is_outside(bones, row, int(ends[row])) for row in tips.tolist()]]
     low, tips = tips[(z[ends[tips]] < z.min() + LOW * size) & ~centred[tips]], tips[centred[tips]]
     head = _head(z[ends[tips]], bones.radii[ends[tips]], z.min() + size / 2)
-    if head is None or len(legs) not in (1, 2) or len(low) != 2 * len(legs):
+    if head is None or len(legs) not in (1, 2) or len(low) != 2 * len(legs) or bones.n_components > 1:
         return {}, FRONT[up]
     head, tails = tips[head], np.delete(tips, head)
 
     def from_head(pair: tuple[int, int]) -> tuple[float, float]:
         route = bones.vertices[bones.path(int(starts[pair[0]]), int(ends[head]))]
-        return float(norm(np.diff(route, axis=0)).sum()), float(norm(bones.vertices[ends[[*pair]]] - route[-1]).min())
+        return float(norm(np.diff(route, axis=0)).sum()), float(
+            norm(bones.vertices[ends[list(pair)]] - route[-1]).min()
+        )
 
     legs, arms = sorted(legs, key=from_head), sorted(arms, key=from_head)[-1:] if len(legs) == 1 else []
     hips, shoulders = (int(starts[pair[0]]) for pair in (legs[-1], (arms or legs)[0]))
@@ -82,7 +85,7 @@ def _limbs(bones: Skeleton, partner: np.ndarray, up: str) -> tuple[dict[int, str
         named |= {int(row): name for row in np.flatnonzero(np.isin(starts, route) & np.isin(ends, route))}
     kinds = ("front_leg", "hind_leg") if len(legs) == 2 else ("leg", "arm")
     for kind, pair in zip(kinds, [*legs, *arms], strict=False):
-        named |= dict.fromkeys(map(int, pair), kind)
+        named |= dict.fromkeys(pair, kind)
     named |= dict.fromkeys(tails.tolist(), "tail") | {int(head): "head"}
     feet = [
         bones.vertices[path[-2:]] if path[-1] == end else bones.vertices[path[1::-1]]

@@ -1,26 +1,21 @@
-"""The armature of a skeleton for animation: its joints, and the bones that move each point of a surface."""
+"""The armature of a skeleton for animation: its joints, and the bone that each bone hangs on."""
 
 import heapq
 import itertools
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from ..curve.merging import merge_into
 from ..curve.rooted import numbered_from
 from ..data.skeleton import Skeleton
 from ..errors import InvalidParameterError
-from ..geometry.polylines import arc_lengths, chord_distances, incident_edges, nearest_on_edges, place_at
+from ..geometry.polylines import arc_lengths, chord_distances, place_at
 from ..geometry.vectors import TINY, Floats, norm
 from .mirror import Plane, mirrored_branches
 
-MOST_WEIGHTS = 4  # published: glTF 2.0, 3.7.3.3, joints of a vertex in one set
-BLEND = 1.5  # fitted: radii beyond its end at which a bone ceases to move a tube; with 1 a bent elbow has a dent
-JOINTS_BETWEEN = 3  # derived: from the bone beyond a limb's root over the trunk's joint to that beyond another's
 CLOSEST_JOINTS = 0.5  # fitted: radii between joints whose number is given
 LONG_BONE = 0.07  # fitted: of the length of the shorter part, which counts as much as the distance of a bend
-MOST_PRODUCTS = 10**8  # speed: a second's; only where thousands of bones meet are there more
 
 
 class _MirroredSet(NamedTuple):
@@ -193,60 +188,6 @@ def _length_in_ball(curve: np.ndarray, radius: float) -> Any:
     before, size = start @ step, norm(step)
     root = np.sqrt(before**2 - size**2 * (start @ start - radius**2))
     return arc_lengths(curve)[outside[0] - 1] + (root - before) / size
-
-
-def skin_weights(forest: Skeleton, points: np.ndarray, vertex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The bones that move each point, and their weights, for linear blend skinning: (N, 4) int and (N, 4) float array.
-
-    The forest has no loops and is numbered from its roots outwards; each edge is a bone, a row of `forest.edges`, with
-    its joint at the end that is nearer to the root. `vertex`, (N,), says which part of the curve a point is on. The
-    farther away a bone is than the nearest one, the less it moves the point: not at all one and a half radii beyond the
-    joint, on a tube, or where the fifth bone is. So weights are continuous along the curve and across the creases
-    at junctions, but not between bones more than three joints apart, nor where five are equally near. They sum to 1.
-    """
-    around, table = incident_edges(forest.edges, len(forest.vertices)), _bones_around(forest)
-    own, _ = nearest_on_edges(forest.vertices, forest.edges, around[vertex], points)
-    own, along = nearest_on_edges(forest.vertices, forest.edges, table[own], points)  # the vertex may be another part's
-    bones = table[own]
-    squared = np.stack([_squared_distance(forest, np.where(bone < 0, own, bone), points) for bone in bones.T], axis=1)
-    squared[bones < 0] = np.inf
-    least = squared.min(axis=1, keepdims=True)
-    start, end = forest.radii[forest.edges[own]].T
-    radius = (start + along * (end - start))[:, None]
-    order = np.argsort(squared, axis=1, kind="stable")[:, : MOST_WEIGHTS + 1]
-    bones, squared = (np.take_along_axis(values, order, axis=1) for values in (bones, squared))
-    fifth = squared[:, MOST_WEIGHTS:].min(axis=1, initial=np.inf, keepdims=True)
-    reach = np.minimum(2 * BLEND**2 * np.fmax(radius**2, least), fifth - least)
-    # on a tube at s beyond the joint the squares of the distances are r^2 + 2 s^2 and r^2: what counts is (s / r)^2
-    share = np.clip(1 - (squared - least) / np.maximum(reach, TINY), 0, 1) ** 2
-    bones, share = (np.pad(values, ((0, 0), (0, MOST_WEIGHTS)))[:, :MOST_WEIGHTS] for values in (bones, share))
-    return np.where(share > 0, bones, 0), share / share.sum(axis=1, keepdims=True)
-
-
-def _bones_around(forest: Skeleton) -> np.ndarray:
-    """The bones that may move the same points as each bone, itself among them, (E, c) int array, filled up with -1."""
-    n = len(forest.edges)
-    ends = csr_array((np.ones(2 * n), (forest.edges.ravel(), np.repeat(np.arange(n), 2))))
-    linked = (ends.T @ ends).astype(bool)
-    near = linked
-    for _ in range(JOINTS_BETWEEN - 1):
-        if np.diff(near.indptr) @ np.diff(linked.indptr) > MOST_PRODUCTS:
-            break
-        near = near @ linked
-    count = np.diff(near.indptr)
-    table = np.full((n, count.max()), -1)
-    table[np.repeat(np.arange(n), count), np.arange(near.nnz) - np.repeat(near.indptr[:-1], count)] = near.indices
-    return table
-
-
-def _squared_distance(forest: Skeleton, bone: np.ndarray, points: np.ndarray) -> Any:
-    """From each point to a bone of its own, (N,) float array; what is beyond an end counts twice."""
-    # else all bones of a joint would be equally near behind it, also those that point away
-    _, along = nearest_on_edges(forest.vertices, forest.edges, bone[:, None], points)
-    start, end = forest.vertices[forest.edges[bone]].swapaxes(0, 1)
-    offset, axis = points - start - along[:, None] * (end - start), end - start
-    beyond = (offset * axis).sum(axis=1) / np.maximum(norm(axis), TINY)
-    return (offset**2).sum(axis=1) + beyond**2
 
 
 def bone_before(forest: Skeleton) -> np.ndarray:

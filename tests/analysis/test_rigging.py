@@ -5,8 +5,9 @@ import pytest
 from scipy.spatial import cKDTree
 
 from glsk_o3d import Skeleton, samples
-from glsk_o3d.analysis.rigging import MOST_WEIGHTS, armature, bone_before, skin_weights
+from glsk_o3d.analysis.rigging import armature, bone_before
 from glsk_o3d.analysis.segmentation import vertex_of_cloud
+from glsk_o3d.analysis.skinning import MOST_WEIGHTS, skin_weights
 from glsk_o3d.errors import InvalidParameterError
 from glsk_o3d.io.formats.graphs import as_forest
 

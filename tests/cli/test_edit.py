@@ -92,10 +92,10 @@ def test_formats_of_trees_are_those_of_the_table():
 @pytest.mark.parametrize("ending", ["ply", "obj", "stl", "xyz"])
 def test_a_mesh_or_a_cloud_hangs_on_the_bones(invoke, tmp_path, y, ending):
     file = tmp_path / f"surface.{ending}"
-    octahedron = o3d.geometry.TriangleMesh.create_octahedron()
+    octahedron = o3d.geometry.TriangleMesh.create_octahedron(0.5)
     octahedron.compute_triangle_normals()
     if ending == "xyz":
-        surface = np.random.default_rng(3).normal(size=(40, 3))
+        surface = np.random.default_rng(3).uniform(-0.5, 0.5, size=(40, 3))
         np.savetxt(file, surface)
     else:
         assert o3d.io.write_triangle_mesh(str(file), octahedron, write_triangle_uvs=False)
@@ -104,6 +104,11 @@ def test_a_mesh_or_a_cloud_hangs_on_the_bones(invoke, tmp_path, y, ending):
     bones = save_rig(read_skeleton(tmp_path / y), tmp_path / "expected.glb", surface, root=(0, 0, -0.5), up="y")
     assert result.stdout == f"{len(bones.edges)} bones\nwrote r.glb\n"
     assert (tmp_path / "r.glb").read_bytes() == (tmp_path / "expected.glb").read_bytes()
+    few = invoke("rig", y, file, "-o", "few.glb", "--joints", 4, "--symmetric")
+    save_rig(read_skeleton(tmp_path / y), tmp_path / "expected.glb", surface, joints=4, symmetric=True)
+    assert few.stdout == "3 bones\nwrote few.glb\n"
+    assert (tmp_path / "few.glb").read_bytes() == (tmp_path / "expected.glb").read_bytes()
+    assert "outside of the cloud" in invoke("rig", y, file, "-o", "far.glb", "--root", "9,9,9").output
 
 
 def test_a_rig_alone_has_its_tubes_and_loops_are_cut_if_one_says_so(invoke, ring_file, tmp_path):

@@ -6,33 +6,38 @@ numbers are float32, as glTF's are; of coordinates as on a map the large part is
 
 import json
 import os
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from ...analysis.limb_names import bone_names
 from ...analysis.mirror import mirror_plane
-from ...analysis.rigging import armature, bone_before, skin_weights
+from ...analysis.rigging import armature, bone_before
 from ...analysis.segmentation import vertex_of_cloud
+from ...analysis.skinning import skin_weights
+from ...analysis.surface import Surface, without_loops
 from ...curve.rooted import RootPlace
 from ...data.skeleton import Skeleton
 from ...errors import FileFormatError, InvalidCloudError, InvalidParameterError
-from ...geometry.vectors import norm, unit
+from ...geometry.vectors import Floats, box
 from ...interop.atomic import check_ending, write_atomically
-from ...interop.clouds import open3d_class, surface_mesh
-from ...parameters import check_number
+from ...interop.clouds import surface_mesh
+from ...parameters import check_number, resolve_point, shown
 from ..geometry import to_tubes
+from .gltf_looks import Texture, png, texture, vertex_looks
 from .graphs import as_forest, global_shift, holding_all
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942  # published: glTF 2.0, 4.4
-ARRAY_TYPES = {(): "SCALAR", (3,): "VEC3", (4,): "VEC4", (16,): "MAT4"}  # published: glTF 2.0, 3.6.2.2
+ARRAY_TYPES = {(): "SCALAR", (2,): "VEC2", (3,): "VEC3", (4,): "VEC4", (16,): "MAT4"}  # published: glTF 2.0, 3.6.2.2
 COMPONENT_TYPES = {"f4": 5126, "u2": 5123, "u4": 5125}  # published: glTF 2.0, 3.6.2.2
 POINTS_MODE, TRIANGLES_MODE = 0, 4  # published: glTF 2.0, 5.24
 RIG_ENDING = ".glb"
 MOST_JOINTS = 65535  # published: glTF 2.0, 3.7.3.3, in which joints are counted in 16 bits at most
 # derived: float32 holds its parts, and they sum to 1 exactly: else far from the origin points move
 WEIGHT_STEPS = 2**16
-SRGB_KNEE = 0.04045  # published: IEC 61966-2-1, where the curve of sRGB begins
+MOST_SCALE = 2.0  # derived: below that of an inch in centimetres, 2.54, of the size of a surface over the skeleton's
+MOST_OFFSET = 0.5  # fitted: sizes between the middles of a surface and of the skeleton
 UPRIGHT = {"z": [-(0.5**0.5), 0.0, 0.0, 0.5**0.5], "y": [0.0, 0.0, 0.0, 1.0]}  # derived: turns up into glTF's y
 
 
@@ -102,27 +107,28 @@ def save_rig(
     if up not in UPRIGHT:
         raise InvalidParameterError(f"up = {up!r}: must be one of {', '.join(UPRIGHT)}")
     check_number("joints", joints, "int?", low=2)
+    drawn = _surface(skeleton) if mesh is None else mesh
+    points, triangles = surface_mesh(drawn)
+    _check_fit(skeleton, points)
+    surface = Surface(points, triangles) if mesh is not None and len(triangles) else None  # tubes meet at no junction
     with holding_all(path):
-        forest = as_forest(skeleton, cut_loops, root)
-        if len(forest.edges) == 0:
-            raise FileFormatError("the skeleton has no edges: there are no bones to make an armature of")
+        forest = as_forest(without_loops(skeleton, points, surface, cut_loops), cut_loops, root)
+        _check_root(root, skeleton)
         plane = mirror_plane(skeleton.points if len(skeleton.points) else skeleton.vertices)
         bones = armature(forest, joints, plane if symmetric else None)
-        data = _content(
-            bones, _surface(skeleton) if mesh is None else mesh, up, bone_names(bones, plane, up, symmetric)
-        )
+        data = _content(bones, drawn, up, bone_names(bones, plane, up, symmetric), surface)
     write_atomically(path, lambda temporary: temporary.write_bytes(data))
     return bones
 
 
 def write(forest: Skeleton) -> bytes:
     """The content of a GLB file: the tubes of a skeleton that is numbered from its roots outwards, and its armature."""
-    if len(forest.edges) == 0:
-        raise FileFormatError("the skeleton has no edges: there are no bones to make an armature of")
     return _content(forest, _surface(forest), "z", bone_names(forest))
 
 
 def _surface(skeleton: Skeleton) -> Any:
+    if len(skeleton.edges) == 0:
+        raise FileFormatError("the skeleton has no edges: there are no bones to make an armature of")
     if np.isfinite(skeleton.radii).all():
         return to_tubes(skeleton, (1, 1, 1))
     if len(skeleton.points) == 0:
@@ -130,13 +136,11 @@ def _surface(skeleton: Skeleton) -> Any:
     return skeleton.points[skeleton.vertex_of_point >= 0]
 
 
-def _content(forest: Skeleton, mesh: Any, up: str, names: list[str]) -> bytes:
+def _content(forest: Skeleton, mesh: Any, up: str, names: list[str], surface: Surface | None = None) -> bytes:
     """The content of a GLB file."""
     if len(forest.edges) > MOST_JOINTS:
         raise FileFormatError(f"glTF counts at most {MOST_JOINTS} bones, not {len(forest.edges)}: simplify it first")
-    mesh = mesh.to_legacy() if open3d_class(mesh) in (("PointCloud", True), ("TriangleMesh", True)) else mesh
     points, triangles = surface_mesh(mesh)
-    _check_place(forest, points)
     origin, arrays = global_shift(forest), list[np.ndarray]()
 
     def array(values: np.ndarray, kind: str) -> int:
@@ -144,18 +148,24 @@ def _content(forest: Skeleton, mesh: Any, up: str, names: list[str]) -> bytes:
         arrays.append(np.ascontiguousarray(values, kind))
         return len(arrays) - 1
 
-    bones, weights = skin_weights(forest, points, vertex_of_cloud(forest, points)[1])
+    bones, weights = skin_weights(forest, points, vertex_of_cloud(forest, points)[1], surface)
     weights[:, 1:] = np.round(weights[:, 1:] * WEIGHT_STEPS) / WEIGHT_STEPS
     weights[:, 0] = 1 - weights[:, 1:].sum(axis=1)
-    attributes = {
-        "POSITION": array(points - origin, "<f4"),
-        "JOINTS_0": array(bones * (weights > 0), "<u2"),
-        "WEIGHTS_0": array(weights, "<f4"),
-        **{name: array(values, "<f4") for name, values in _looks(mesh, len(points)).items()},
-    }
-    primitive: dict[str, Any] = {"attributes": attributes, "mode": POINTS_MODE}
-    if len(triangles):
-        primitive |= {"indices": array(triangles.reshape(-1), "<u4"), "mode": TRIANGLES_MODE}
+    values = {"POSITION": points - origin, "JOINTS_0": bones * (weights > 0), "WEIGHTS_0": weights}
+    values |= vertex_looks(mesh, len(points))
+    image = texture(mesh, len(triangles))
+    if image is not None:  # a vertex has one place in the texture
+        corners = np.column_stack([triangles.reshape(-1), image.corners])
+        corners, number = np.unique(corners, axis=0, return_inverse=True)
+        values = {name: rows[corners[:, 0].astype(int)] for name, rows in values.items()}
+        values["TEXCOORD_0"], triangles = corners[:, 1:], number.reshape(-1, 3)
+    attributes = {name: array(rows, "<u2" if name == "JOINTS_0" else "<f4") for name, rows in values.items()}
+    material = np.zeros(len(triangles), int) if image is None else image.material
+    primitives: list[dict[str, Any]] = []
+    for each in np.unique(material).tolist():
+        part = {"indices": array(triangles[material == each].reshape(-1), "<u4"), "mode": TRIANGLES_MODE}
+        primitives.append({"attributes": attributes} | part | ({} if image is None else {"material": each}))
+    primitives = primitives or [{"attributes": attributes, "mode": POINTS_MODE}]
     joints, places = _joints(forest, origin, names)
     at_rest = np.tile(np.eye(4), (len(places), 1, 1))  # glTF has matrices by columns
     at_rest[:, 3, :3] = -places
@@ -172,34 +182,55 @@ def _content(forest: Skeleton, mesh: Any, up: str, names: list[str]) -> bytes:
         "scene": 0,
         "scenes": [{"nodes": [n, n + 1]}],
         "nodes": [*joints, armature, {"name": "surface", "mesh": 0, "skin": 0}],
-        "meshes": [{"primitives": [primitive]}],
+        "meshes": [{"primitives": primitives}],
         "skins": [skin],
     }
-    return _glb(scene, arrays)
+    return _glb(scene if image is None else scene | _materials(image, array), arrays)
 
 
-def _check_place(forest: Skeleton, points: np.ndarray) -> None:
-    """InvalidCloudError unless the points of a surface are finite, and near the skeleton for its size."""
+def _materials(look: Texture, array: Callable[[np.ndarray, str], int]) -> dict[str, Any]:
+    """Materials, and the images that they have, each one array of bytes."""
+    materials, images = [], list[dict[str, Any]]()
+    for image in look.images:
+        surface: dict[str, Any] = {"metallicFactor": 0.0, **look.factors}
+        if image is not None:
+            surface["baseColorTexture"] = {"index": len(images)}
+            images.append({"bufferView": array(png(image), "u1"), "mimeType": "image/png"})
+        materials.append({"pbrMetallicRoughness": surface})
+    textures = [{"source": number} for number in range(len(images))]
+    return {"materials": materials} | ({"images": images, "textures": textures} if images else {})
+
+
+def _check_fit(skeleton: Skeleton, points: np.ndarray) -> None:
+    """InvalidCloudError unless the points of a surface are finite, and it has the size and place of the skeleton."""
     if not np.isfinite(points).all():
         raise InvalidCloudError("the surface has points that are not finite: drop them first")
-    low, high = forest.vertices.min(axis=0), forest.vertices.max(axis=0)
-    gap = max((points.min(axis=0) - high).max(), (low - points.max(axis=0)).max())
-    if gap > np.linalg.norm(high - low):
-        raise InvalidCloudError("the surface is not where the skeleton is: are they in the same units and place?")
+    low, high = _box(skeleton)
+    size, own = (float(np.linalg.norm(extent)) for extent in (high - low, np.ptp(points, axis=0)))
+    sizes = f"the surface is {own:.4g} large, and the skeleton with its cloud {size:.4g}"
+    if not size / MOST_SCALE <= own <= size * MOST_SCALE:
+        raise InvalidCloudError(f"{sizes}: are they of the same object and in the same units?")
+    middle = np.linalg.norm((points.min(axis=0) + points.max(axis=0) - low - high) / 2)
+    if middle > MOST_OFFSET * max(size, own):
+        raise InvalidCloudError(f"the surface is not where the skeleton is: {middle:.4g} away; {sizes}")
 
 
-def _looks(mesh: Any, n: int) -> dict[str, np.ndarray]:
-    """Normals and colours, where each vertex has one; colours are linear in glTF."""
-    prefix = {"PointCloud": "", "TriangleMesh": "vertex_"}.get(open3d_class(mesh)[0])
-    if prefix is None:
-        return {}
-    looks = {}
-    normals, colors = (np.asarray(getattr(mesh, prefix + name)) for name in ("normals", "colors"))
-    if len(normals) == n and (norm(normals) > 0).all():
-        looks["NORMAL"] = unit(normals)
-    if len(colors) == n:
-        looks["COLOR_0"] = np.where(colors <= SRGB_KNEE, colors / 12.92, ((colors + 0.055) / 1.055) ** 2.4)
-    return looks
+def _check_root(root: RootPlace | None, skeleton: Skeleton) -> None:
+    """InvalidParameterError if a root is a point outside of the box around the cloud."""
+    point = resolve_point(root if root is None or isinstance(root, str) else tuple(np.atleast_1d(root).tolist()))
+    low, high = _box(skeleton)
+    if point is not None and not ((low <= point) & (point <= high)).all():
+        low_words, high_words = (", ".join(f"{number:.4g}" for number in corner) for corner in (low, high))
+        raise InvalidParameterError(
+            f"root = {shown(point)}: is outside of the cloud, from ({low_words}) to ({high_words})"
+        )
+
+
+def _box(skeleton: Skeleton) -> tuple[Floats, Floats]:
+    """Around the cloud of a skeleton and its balls."""
+    radii = np.nan_to_num(skeleton.radii)[:, None]
+    known = skeleton.points[skeleton.vertex_of_point >= 0]
+    return box(np.concatenate([skeleton.vertices - radii, skeleton.vertices + radii, known]))
 
 
 def _joints(forest: Skeleton, origin: np.ndarray, names: list[str]) -> tuple[list[dict[str, Any]], np.ndarray]:
@@ -220,6 +251,9 @@ def _glb(scene: dict[str, Any], arrays: list[np.ndarray]) -> bytes:
     body, views, accessors = b"", [], []
     for number, values in enumerate(arrays):
         views.append({"buffer": 0, "byteOffset": len(body), "byteLength": values.nbytes})
+        if values.dtype == np.uint8:  # of an image, which is the last
+            body += _padded(values.tobytes(), b"\0")
+            continue
         limits = {
             name: np.atleast_1d(value).tolist() for name, value in (("min", values.min(0)), ("max", values.max(0)))
         }

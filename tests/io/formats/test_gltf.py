@@ -1,15 +1,19 @@
 """A rig in a glTF library: turning a bone moves the surface of its limb alone."""
 
+import io
+
 import numpy as np
 import pytest
+from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from glsk_o3d import Skeleton, to_tubes
 from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from glsk_o3d.io.formats.gltf import save_rig
+from glsk_o3d.io.formats.gltf_looks import in_bytes, png
 
 KINDS = {5121: "u1", 5123: "u2", 5125: "u4", 5126: "f4"}
-WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 
 def accessor(file, number):
@@ -102,6 +106,64 @@ def test_triangles_normals_and_colours_go_along(tree, rig):
     assert (bare.mode, bare.attributes.NORMAL, bare.attributes.COLOR_0) == (0, None, None)
 
 
+def textured_box(kind):
+    """A box of two materials, one with an image whose corner at u = v = 0 is blue, as Open3D reads and holds it."""
+    import open3d as o3d
+
+    mesh = o3d.geometry.TriangleMesh.create_box(create_uv_map=True)
+    image = np.full((8, 8, 3), 200, np.uint8)
+    image[-1, 0] = [0, 0, 255]
+    if kind == "legacy":  # Open3D holds the lowest row first
+        mesh.textures = [o3d.geometry.Image(), o3d.geometry.Image(np.ascontiguousarray(image[::-1]))]
+        mesh.triangle_material_ids = o3d.utility.IntVector([1] * 10 + [0] * 2)
+        return mesh, image
+    tensor = o3d.t.geometry.TriangleMesh.from_legacy(mesh)
+    tensor.material.set_default_properties()
+    tensor.material.texture_maps["albedo"] = o3d.t.geometry.Image(o3d.core.Tensor(image))
+    tensor.material.scalar_properties["metallic"] = 0.25
+    return tensor, image
+
+
+@pytest.mark.parametrize("kind", ["legacy", "tensor"])
+def test_textures_and_materials_go_along(rig, tmp_path, kind):
+    trimesh = pytest.importorskip("trimesh")
+    mesh, image = textured_box(kind)
+    line = Skeleton([[0.5, 0.5, 0.2], [0.5, 0.5, 0.8]], [[0, 1]], [0.3, 0.3], (), (), ())
+    file = rig(line, mesh, up="y")
+    parts = file.meshes[0].primitives
+    assert [part.material for part in parts] == ([0, 1] if kind == "legacy" else [0])
+    assert file.materials[0].pbrMetallicRoughness.metallicFactor == (0 if kind == "legacy" else 0.25)
+    legacy = mesh if kind == "legacy" else mesh.to_legacy()
+    corners = np.concatenate([accessor(file, part.indices).ravel() for part in parts[::-1]])
+    place = accessor(file, parts[0].attributes.POSITION)[corners]
+    np.testing.assert_array_equal(place, np.asarray(legacy.vertices)[np.asarray(legacy.triangles).ravel()])
+    uv = accessor(file, parts[0].attributes.TEXCOORD_0)[corners]
+    np.testing.assert_allclose(uv, np.asarray(legacy.triangle_uvs) * [1, -1] + [0, 1], atol=1e-7)
+    (shown,) = (
+        part.visual
+        for part in trimesh.load(tmp_path / "r.glb").geometry.values()
+        if part.visual.material.baseColorTexture is not None
+    )
+    np.testing.assert_array_equal(np.asarray(shown.material.baseColorTexture.convert("RGB")), image)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+def test_images_of_all_kinds_become_eight_bits(dtype):
+    top = 1.0 if dtype == np.float32 else np.iinfo(dtype).max
+    image = (np.linspace(0, 1, 48).reshape(4, 4, 3) * top).astype(dtype)
+    shown = Image.open(io.BytesIO(png(in_bytes(image)).tobytes()))
+    np.testing.assert_allclose(np.asarray(shown), np.linspace(0, 255, 48).reshape(4, 4, 3), atol=1)
+
+
+def test_places_in_a_texture_without_one_are_kept(rig):
+    import open3d as o3d
+
+    box = o3d.geometry.TriangleMesh.create_box(create_uv_map=True)
+    file = rig(Skeleton([[0.5, 0.5, 0.2], [0.5, 0.5, 0.8]], [[0, 1]], [0.3, 0.3], (), (), ()), box)
+    assert file.meshes[0].primitives[0].attributes.TEXCOORD_0 is not None
+    assert file.images == []
+
+
 def test_without_radii_the_points_are_the_surface(rig):
     line = Skeleton([[0, 0, 0], [1, 0, 0]], [[0, 1]], [np.nan] * 2, [0, 1], [[0, 1, 0], [1, 1, 0]], np.ones((2, 3)))
     file = rig(line, up="y")
@@ -114,15 +176,23 @@ def test_what_cannot_be_rigged(tree, make, tmp_path):
     bare = Skeleton([[0, 0, 0], [1, 0, 0]], [[0, 1]], [np.nan] * 2, (), (), ())
     for error, noun, *arguments in (
         (FileFormatError, "no edges", make([[0, 0, 0]], []), path),
-        (FileFormatError, "65535 bones", Skeleton(*chain, np.ones(n), (), (), ()), path, [[0, 0, 0]]),
+        (FileFormatError, "65535 bones", Skeleton(*chain, np.ones(n), (), (), ()), path, chain[0][[0, -1]]),
         (FileFormatError, "radii or points", bare, path),
         (FileFormatError, r"\.glb", tree, tmp_path / "r.fbx"),
         (InvalidCloudError, "not finite", tree, path, [[np.nan, 0, 0]]),
         (InvalidCloudError, "not where the skeleton is", tree, path, tree.vertices + 100),
-        (InvalidCloudError, "not where the skeleton is", tree, path, tree.vertices * 1000 + 5000),
+        (InvalidCloudError, r"569\.3 large, and the skeleton .* 16\.57", tree, path, tree.vertices * 38),
+        (InvalidCloudError, "same units", tree, path, tree.vertices / 2.54),
     ):
         with pytest.raises(error, match=noun):
             save_rig(*arguments)
-    with pytest.raises(InvalidParameterError, match="up = 'x'"):
-        save_rig(tree, path, up="x")
+    for noun, options in (
+        ("up = 'x'", {"up": "x"}),
+        (r"root = .*outside of the cloud, from \(", {"root": (0, 0, -9)}),
+        ("outside", {"root": "0,99,0"}),
+        ("joints = 1", {"joints": 1}),
+        ("joints = 3: .* 4 ends", {"joints": 3}),
+    ):
+        with pytest.raises(InvalidParameterError, match=noun):
+            save_rig(tree, path, **options)
     assert not list(tmp_path.iterdir())
