@@ -64,8 +64,11 @@ def _limbs(bones: Skeleton, partner: np.ndarray, up: str) -> tuple[dict[int, str
     length = np.bincount(bones.branch_of_edge, bones.edge_lengths, len(rows))
     arms = [pair for pair in pairs if pair not in legs and length[list(pair)].min() > LEAST_ARM * size]
     tips = np.flatnonzero(bones.degree[ends] == 1)
-    tips = tips[[_is_outside(bones, row, int(ends[row])) for row in tips.tolist()]]
-    low, tips = tips[(z[ends[tips]] < z.min() + LOW * size) & ~centred[tips]], tips[centred[tips]]
+    outside = tips[[_is_outside(bones, row, int(ends[row])) for row in tips.tolist()]]
+    low = outside[(z[ends[outside]] < z.min() + LOW * size) & ~centred[outside]]
+    onward = np.concatenate([starts[centred], starts[[row for row, _ in legs]]])  # beyond which the trunk goes on
+    last = np.union1d(outside, np.setdiff1d(rows, tips))
+    tips = last[centred[last] & ~np.isin(ends[last], onward)]
     head = _head(z[ends[tips]], bones.radii[ends[tips]], z.min() + size / 2)
     if head is None or len(legs) not in (1, 2) or len(low) != 2 * len(legs) or bones.n_components > 1:
         return {}, FRONT[up]
@@ -86,7 +89,7 @@ def _limbs(bones: Skeleton, partner: np.ndarray, up: str) -> tuple[dict[int, str
     kinds = ("front_leg", "hind_leg") if len(legs) == 2 else ("leg", "arm")
     for kind, pair in zip(kinds, [*legs, *arms], strict=False):
         named |= dict.fromkeys(pair, kind)
-    named |= dict.fromkeys(tails.tolist(), "tail") | {int(head): "head"}
+    named |= dict.fromkeys(tails.tolist() if len(tails) == 1 else (), "tail") | {int(head): "head"}
     feet = [
         bones.vertices[path[-2:]] if path[-1] == end else bones.vertices[path[1::-1]]
         for path, end in ((bones.branches[row], ends[row]) for row in legs[-1])
@@ -105,10 +108,10 @@ def _is_outside(bones: Skeleton, row: int, end: int) -> bool:
 
 
 def _head(height: Floats, radius: Floats, middle: float) -> int | None:
-    """Which of one or two ends in the plane is the head: the thicker one, or the higher one if they are as thick."""
+    """Which of some ends in the plane is the head: the thickest, or the higher one if two are about as thick."""
     if len(height) == 1:
         return 0 if height[0] > middle else None
-    if len(height) != 2:
-        return None
-    thick, thin = np.argsort(-radius)
-    return int(thick if radius[thick] > THICKER_HEAD * radius[thin] else height.argmax())
+    order = np.argsort(-radius)
+    if len(height) > 1 and radius[order[0]] > THICKER_HEAD * radius[order[1]]:
+        return int(order[0])
+    return int(height.argmax()) if len(height) == 2 else None

@@ -9,7 +9,7 @@ from scipy.spatial.distance import cdist
 
 from ..data.skeleton import Skeleton
 from ..geometry.polylines import arc_lengths, place_at
-from ..geometry.vectors import Floats, finite_rows, norm, unit
+from ..geometry.vectors import TINY, Floats, finite_rows, norm, unit
 
 MIRRORED_POINTS = 1500  # speed: of the cloud, whose mirror image is compared with it
 FARTHEST_MIRRORED = 0.1  # fitted: of the object's size, what a point without a mirror image counts at most
@@ -17,6 +17,7 @@ TRIED_NORMALS = 60  # fitted: directions over the half sphere, a dozen degrees a
 REFINED_NORMALS = 4  # fitted: of them, the best
 COMPARED_PART = np.linspace(0.3, 1, 8)  # fitted: of two branches; where limbs begin, the trunk shifts them
 PAIR_TOLERANCE = 0.2  # fitted: distance of a branch from the mirror image of its partner, over its length
+NO_PARTNER = 3.0  # derived: more than two partners at the limit, so that no pair is given up for one
 
 
 class Plane(NamedTuple):
@@ -76,10 +77,10 @@ def mirrored_branches(skeleton: Skeleton, plane: Plane) -> np.ndarray:
         return np.empty(0, int)
     mirrored = np.stack([plane.mirrored(places) for places in samples]).reshape(len(samples), -1)
     distance = cdist(mirrored, np.stack(samples).reshape(len(samples), -1)) / len(COMPARED_PART) ** 0.5
-    distance = (distance + distance.T) / 2
-    partner = linear_sum_assignment(distance)[1]
     length = np.array([at[-1] for at in lengths])
-    rows = np.arange(len(partner))
-    limit = PAIR_TOLERANCE * np.minimum(length, length[partner])
+    limit = PAIR_TOLERANCE * np.minimum(length[:, None], length)
     limit += np.array([np.nan_to_num(skeleton.radii[path]).mean() for path in skeleton.branches])
-    return np.where((partner[partner] == rows) & (distance[rows, partner] <= limit), partner, -1)
+    share = (distance + distance.T) / np.maximum(limit + limit.T, TINY)
+    partner = linear_sum_assignment(np.where(share <= 1, share, NO_PARTNER))[1]
+    rows = np.arange(len(partner))
+    return np.where((partner[partner] == rows) & (share[rows, partner] <= 1), partner, -1)
