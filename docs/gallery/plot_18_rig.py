@@ -14,7 +14,7 @@ import open3d as o3d
 import pygltflib
 
 import glsk_o3d as glsk
-from glsk_o3d import editing, samples
+from glsk_o3d import samples
 
 # %%
 # A scan and its surface: Poisson's, from the points and normals.
@@ -27,19 +27,19 @@ mesh, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, depth
 print(mesh)
 
 # %%
-# Few bones are easier to pose: the skeleton, simplified to a hundredth of the animal's size. The handle on its back is
-# a loop, and an armature has none: it is cut open. The mesh stays whole.
+# Few bones are easier to pose: 25 joints, at ends, junctions and bends. The handle on its back is a loop, and an
+# armature has none: it is cut open at its thinnest place. The mesh stays whole.
 
-skeleton = editing.simplify(glsk.skeletonize(cloud), tolerance=0.01)
-print(skeleton)
+skeleton = glsk.skeletonize(cloud)
 folder = TemporaryDirectory()
 path = Path(folder.name, "animal.glb")
-glsk.save_rig(skeleton, path, mesh, cut_loops=True)
+armature = glsk.save_rig(skeleton, path, mesh, joints=25, cut_loops=True)
+print(armature)
 print(f"{path.stat().st_size // 1024} kB")
 
 # %%
 # A glTF library reads joints, and for every vertex of the mesh the few joints that move it. Blender shows the same,
-# with the bones named after their branches.
+# with the bones named after the limbs.
 
 file = pygltflib.GLTF2().load(str(path))
 
@@ -68,10 +68,8 @@ parent = {child: number for number, node in enumerate(file.nodes) for child in n
 rest = {}
 for joint in file.skins[0].joints:  # they are numbered from the root outwards
     rest[joint] = np.array(file.nodes[joint].translation) + rest.get(parent.get(joint), 0)
-head = max(rest, key=lambda joint: rest[joint][0])
-neck, joint = [], head
-while joint in rest and rest[joint][0] > 0.25:
-    neck, joint = [*neck, joint], parent.get(joint)
+neck = [joint for joint in rest if file.nodes[joint].name.startswith(("neck", "head"))]
+print([file.nodes[joint].name for joint in neck])
 
 
 def posed(angle):

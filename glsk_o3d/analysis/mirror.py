@@ -9,11 +9,11 @@ from scipy.spatial.distance import cdist
 
 from ..data.skeleton import Skeleton
 from ..geometry.polylines import arc_lengths, place_at
-from ..geometry.vectors import TINY, Floats, finite_rows, norm, unit
+from ..geometry.vectors import TINY, Floats, finite_rows, unit
 
 MIRRORED_POINTS = 1500  # speed: of the cloud, whose mirror image is compared with it
 FARTHEST_MIRRORED = 0.1  # fitted: of the object's size, what a point without a mirror image counts at most
-TRIED_NORMALS = 60  # fitted: directions over the half sphere, a dozen degrees apart, besides the principal axes
+TRIED_NORMALS = 100  # fitted: directions, a dozen degrees apart on the half sphere, besides the principal axes
 REFINED_NORMALS = 4  # fitted: of them, the best
 COMPARED_PART = np.linspace(0.3, 1, 8)  # fitted: of two branches; where limbs begin, the trunk shifts them
 PAIR_TOLERANCE = 0.2  # fitted: distance of a branch from the mirror image of its partner, over its length
@@ -26,46 +26,38 @@ class Plane(NamedTuple):
     point: Floats
     normal: Floats
 
-    def height(self, places: Floats) -> Floats:
-        """Signed distances of places (n, 3), (n,) float array."""
-        distance: Floats = (places - self.point) @ self.normal
-        return distance
-
     def mirrored(self, places: Floats) -> Floats:
         """Mirror images of places (n, 3)."""
-        return places - 2 * self.height(places)[:, None] * self.normal
+        mirrored: Floats = places - 2 * ((places - self.point) @ self.normal)[:, None] * self.normal
+        return mirrored
 
 
 def mirror_plane(points: np.ndarray) -> Plane:
     """The plane in which points (N, 3) are nearest to their mirror image: a minimum of the mean nearest distance.
 
-    The search begins with the principal planes and with directions over the whole half sphere, through the middle of
+    The search begins with the principal planes and with random directions, through the middle of
     the points, and refines the best. Every object has such a plane; whether it is symmetric is another question.
     """
     points = points[finite_rows(points)]
     points = points[np.unique(np.linspace(0, len(points) - 1, MIRRORED_POINTS).astype(int))]
-    middle, size, tree = points.mean(axis=0), max(float(norm(np.ptp(points, axis=0)[None])[0]), 1e-300), cKDTree(points)
-    most = FARTHEST_MIRRORED * size
+    middle, size, tree = points.mean(axis=0), max(float(np.linalg.norm(np.ptp(points, axis=0))), TINY), cKDTree(points)
+
+    def plane(numbers: np.ndarray) -> Plane:
+        """With this normal, of any length; the fourth number is its distance from the middle, over the size."""
+        normal = unit(numbers[None, :3])[0]
+        return Plane(middle + size * numbers[3] * normal, normal)
 
     def mismatch(numbers: np.ndarray) -> float:
-        """Of the plane with this normal, of any length, whose distance from the middle is the fourth number."""
-        normal = unit(numbers[None, :3])[0]
-        mirrored = Plane(middle + size * numbers[3] * normal, normal).mirrored(points)
-        return float(np.minimum(tree.query(mirrored, distance_upper_bound=most)[0], most).mean())
+        distance = tree.query(plane(numbers).mirrored(points))[0]
+        return float(np.minimum(distance, FARTHEST_MIRRORED * size).mean())
 
-    turn, height = np.arange(TRIED_NORMALS) * np.pi * (3 - 5**0.5), (np.arange(TRIED_NORMALS) + 0.5) / TRIED_NORMALS
-    across = np.sqrt(1 - height**2)
-    sphere = np.column_stack([across * np.cos(turn), across * np.sin(turn), height])
-    normals = np.concatenate([np.linalg.svd(points - middle, full_matrices=False)[2], sphere])
+    tried = np.random.default_rng(0).normal(size=(TRIED_NORMALS, 3))
+    normals = np.concatenate([np.linalg.svd(points - middle, full_matrices=False)[2], tried])
     starts = sorted(np.pad(normals, ((0, 0), (0, 1))), key=mismatch)[:REFINED_NORMALS]
     steps = np.concatenate([np.zeros((1, 4)), np.diag([0.1, 0.1, 0.1, 0.02])])
-    refined = [
-        minimize(mismatch, start, method="Nelder-Mead", options={"initial_simplex": start + steps, "maxfev": 300})
-        for start in starts
-    ]
-    best = min(refined, key=lambda each: each.fun).x
-    normal = unit(best[None, :3])[0]
-    return Plane(middle + size * best[3] * normal, normal)
+    options = [{"initial_simplex": start + steps, "maxfev": 300} for start in starts]
+    ends = [minimize(mismatch, each["initial_simplex"][0], method="Nelder-Mead", options=each) for each in options]
+    return plane(min(ends, key=lambda each: float(each.fun)).x)
 
 
 def mirrored_branches(skeleton: Skeleton, plane: Plane) -> np.ndarray:

@@ -22,8 +22,9 @@ class _MirroredSet(NamedTuple):
     """Branches that have joints in the same places: one, or two that are mirror images of each other."""
 
     rows: list[int]
+    path: np.ndarray  # of the first
     centred: bool
-    curve: Floats  # of the first, through its vertices, as far as it and its mirror image agree
+    curve: Floats  # through its vertices, in the middle between it and the mirror image
     radii: Floats
 
 
@@ -40,7 +41,11 @@ def armature(forest: Skeleton, joints: int | None = None, plane: Plane | None = 
     """
     whole, root = _without_junctions_in_balls(forest)
     sets, ends = _mirrored_sets(whole, plane), whole.degree != 2
-    lengths = _lengths_by_radius(whole, sets, root) if joints is None else _telling_lengths(whole, sets, root, joints)
+    if joints is None:
+        forks = [whole.degree[each.path[[0, -1]]] > 2 for each in sets]
+        lengths = [_joints_along(each, fork, each.path == root) for each, fork in zip(sets, forks, strict=True)]
+    else:
+        lengths = _telling_lengths(whole, sets, root, joints)
     joint = np.where(ends, np.cumsum(ends) - 1, -1)  # of each vertex
     end_places = whole.vertices.copy()
     places, radii, edges, n = [], [whole.radii[ends]], [np.empty((0, 2), int)], int(ends.sum())
@@ -68,74 +73,60 @@ def armature(forest: Skeleton, joints: int | None = None, plane: Plane | None = 
 def _mirrored_sets(skeleton: Skeleton, plane: Plane | None) -> list[_MirroredSet]:
     """All branches, each alone, or with its mirror image in a plane."""
     curves, radii = ([values[path] for path in skeleton.branches] for values in (skeleton.vertices, skeleton.radii))
-    if plane is None:
-        return [_MirroredSet([row], False, *both) for row, both in enumerate(zip(curves, radii, strict=True))]
-    sets = []
-    for row, other in enumerate(mirrored_branches(skeleton, plane).tolist()):
+    partner, sets = [-1] * len(curves) if plane is None else mirrored_branches(skeleton, plane).tolist(), []
+    for row, other in enumerate(partner):
         curve, radius = curves[row], radii[row]
-        if other >= row:
+        if plane is not None and other >= row:
             share, lengths = arc_lengths(curve), arc_lengths(curves[other])
             share *= lengths[-1] / max(share[-1], TINY)
             curve = (curve + plane.mirrored(place_at(curves[other], lengths, share))) / 2
             radius = (radius + np.interp(share, lengths, radii[other])) / 2
         if other >= row or other < 0:
-            sets.append(_MirroredSet([row, other] if other > row else [row], other == row, curve, radius))
+            rows = [row, other] if other > row else [row]
+            sets.append(_MirroredSet(rows, skeleton.branches[row], other == row, curve, radius))
     return sets
-
-
-def _lengths_by_radius(skeleton: Skeleton, sets: list[_MirroredSet], root: int) -> list[np.ndarray]:
-    """Lengths along the curves of sets of branches of joints that are a radius apart."""
-    lengths = []
-    for each in sets:
-        path = skeleton.branches[each.rows[0]]
-        forks = skeleton.degree[path[[0, -1]]] > 2
-        lengths.append(_joints_along(each.curve, np.nan_to_num(each.radii), forks, path == root))
-    return lengths
 
 
 def _telling_lengths(skeleton: Skeleton, sets: list[_MirroredSet], root: int, joints: int) -> list[np.ndarray]:
     """Lengths along the curves of sets of branches of the joints that tell most of the curve, so many in all."""
-    chosen = [
-        sorted({0, len(each.curve) - 1, *np.flatnonzero(skeleton.branches[each.rows[0]] == root).tolist()})
-        for each in sets
-    ]
-    n = int(np.union1d(np.flatnonzero(skeleton.degree != 2), [root]).size)
+    chosen = [sorted({0, len(each.curve) - 1, *np.flatnonzero(each.path == root).tolist()}) for each in sets]
+    n = int((skeleton.degree != 2).sum()) + sum(
+        (len(rows) - 2) * len(each.rows) for each, rows in zip(sets, chosen, strict=True)
+    )
     if joints < n:
         raise InvalidParameterError(
-            f"joints = {joints}: the skeleton has {n} ends and junctions, the root among them; drop branches first "
-            "(editing.prune, --prune-length), or ask for more"
+            f"joints = {joints}: the skeleton has {n} ends and junctions, the root among them: ask for as many, "
+            "or drop branches first (editing.prune, --prune-length)"
         )
     queue: list[tuple[float, int, int, int, int]] = []
 
-    def offer(number: int, first: int, last: int) -> None:
-        weight, place = _telling_place(sets[number].curve, sets[number].radii, first, last)
-        if weight > 0:
+    def offer(number: int, *parts: tuple[int, int]) -> None:
+        for first, last in parts:
+            weight, place = _telling_place(sets[number].curve, sets[number].radii, first, last)
             heapq.heappush(queue, (-weight, number, first, place, last))
 
     for number, rows in enumerate(chosen):
-        for first, last in itertools.pairwise(rows):
-            offer(number, first, last)
+        offer(number, *itertools.pairwise(rows))
     while queue and n < joints:
-        _, number, first, place, last = heapq.heappop(queue)
-        if n + len(sets[number].rows) <= joints:
+        weight, number, first, place, last = heapq.heappop(queue)
+        if weight < 0 and n + len(sets[number].rows) <= joints:
             n += len(sets[number].rows)
             chosen[number].append(place)
-            offer(number, first, place)
-            offer(number, place, last)
+            offer(number, (first, place), (place, last))
     return [arc_lengths(each.curve)[sorted(rows)] for each, rows in zip(sets, chosen, strict=True)]
 
 
 def _telling_place(curve: np.ndarray, radii: np.ndarray, first: int, last: int) -> tuple[float, int]:
-    """The place of a curve between two others where a joint tells most of it, and how much, as a length.
+    """How much a joint tells of a curve between two others, as a length, 0 if they are too near, and its place.
 
     That is its distance from the chord (Douglas and Peucker 1973), and a share of the length of the shorter part.
     """
-    inner, lengths = slice(first + 1, last), arc_lengths(curve)
-    distance = chord_distances(curve[first : last + 1])[1:-1]
-    shorter = np.minimum(lengths[inner] - lengths[first], lengths[last] - lengths[inner])
-    weight = np.where(shorter >= CLOSEST_JOINTS * np.nan_to_num(radii[inner]), distance + LONG_BONE * shorter, 0)
-    place = int(weight.argmax()) if last - first > 1 else 0
-    return float(weight[place]) if last - first > 1 else 0.0, first + 1 + place
+    along = arc_lengths(curve[first : last + 1])
+    shorter = np.minimum(along, along[-1] - along)
+    weight = chord_distances(curve[first : last + 1]) + LONG_BONE * shorter
+    weight[shorter < CLOSEST_JOINTS * np.nan_to_num(radii[first : last + 1])] = 0
+    place = int(weight.argmax())
+    return float(weight[place]), first + place
 
 
 def _without_junctions_in_balls(forest: Skeleton) -> tuple[Skeleton, int]:
@@ -159,9 +150,9 @@ def _without_junctions_in_balls(forest: Skeleton) -> tuple[Skeleton, int]:
         forest = merge_into(forest, group)
 
 
-def _joints_along(curve: np.ndarray, radii: np.ndarray, forks: np.ndarray, kept: np.ndarray) -> np.ndarray:
+def _joints_along(branch: _MirroredSet, forks: np.ndarray, kept: np.ndarray) -> np.ndarray:
     """Lengths along a branch of its joints, with its ends and the vertices `kept` among them, (k,) float array."""
-    lengths = arc_lengths(curve)
+    curve, radii, lengths = branch.curve, np.nan_to_num(branch.radii), arc_lengths(branch.curve)
     low = _length_in_ball(curve, radii[0]) if forks[0] else 0.0
     high = lengths[-1] - (_length_in_ball(curve[::-1], radii[-1]) if forks[1] else 0.0)
     inner = np.array([low, high])[forks] if low <= high else []

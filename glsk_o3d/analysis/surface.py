@@ -1,6 +1,7 @@
 """Distances along a surface: which parts of an object are apart though they touch."""
 
 import numpy as np
+from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 
 from ..data.skeleton import Skeleton
@@ -13,7 +14,6 @@ from .segmentation import vertex_of_cloud
 TOUCH_WINDOWS = (1.0, 2.0, 3.0)  # fitted: radii either way along a loop, over which it is compared with the surface
 TOUCH_RATIO = 3.0  # fitted: distance along the surface over that along the curve, of parts that touch
 LONGEST_RATIO = 10.0  # speed: of the same, beyond which nobody looks
-THIN_FIRST = 0.5  # derived: below 1 and so below the ratio of a touch, where loops are cut at their thinnest edge
 
 
 class Surface:
@@ -62,17 +62,14 @@ def without_loops(skeleton: Skeleton, points: np.ndarray, surface: Surface | Non
     """
     if skeleton.n_loops == 0:
         return skeleton
-    ratio = np.zeros(len(skeleton.edges)) if surface is None else _surface_ratios(skeleton, points, surface)
+    m, ratio = len(skeleton.vertices), np.zeros(len(skeleton.edges))
+    if surface is not None:
+        ratio = _surface_ratios(skeleton, points, surface)
     thick = np.nan_to_num(skeleton.radii)[skeleton.edges].min(axis=1)
-    weight = np.where(ratio > TOUCH_RATIO, ratio, 1 - THIN_FIRST * thick / max(thick.max(), TINY))
-    m = len(skeleton.vertices)
-    tree = linked(skeleton.vertices, skeleton.edges)
-    row = np.repeat(np.arange(m), np.diff(tree.indptr))
-    key = np.minimum(row, tree.indices) * m + np.maximum(row, tree.indices)
-    tree.data = weight[np.searchsorted(skeleton.edges @ [m, 1], key)]
-    kept = np.sort(np.column_stack(minimum_spanning_tree(tree).nonzero()), axis=1) @ [m, 1]
-    stays = np.isin(skeleton.edges @ [m, 1], kept) | ((ratio <= TOUCH_RATIO) & (not cut))
-    return skeleton.changed(edges=skeleton.edges[stays])
+    weight = np.where(ratio > TOUCH_RATIO, ratio, 2 - thick / max(thick.max(), TINY))  # from 1 to 2, below any touch
+    tree = minimum_spanning_tree(csr_array((weight, skeleton.edges.T), shape=(m, m)))
+    stays = np.isin(skeleton.edges @ [m, 1], np.column_stack(tree.nonzero()) @ [m, 1])
+    return skeleton.changed(edges=skeleton.edges[stays | ((ratio <= TOUCH_RATIO) & (not cut))])
 
 
 def _surface_ratios(skeleton: Skeleton, points: np.ndarray, surface: Surface) -> np.ndarray:

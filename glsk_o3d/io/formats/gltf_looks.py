@@ -44,37 +44,24 @@ def texture(mesh: Any, n: int) -> Texture | None:
     name, tensor = open3d_class(mesh)
     if name != "TriangleMesh" or not (("texture_uvs" in mesh.triangle) if tensor else mesh.has_triangle_uvs()):
         return None
-    images, material, factors = [None], np.zeros(n, int), {}
-    if tensor:
-        corners = mesh.triangle["texture_uvs"].cpu().numpy().reshape(-1, 2)
-        if mesh.has_valid_material():
-            look = mesh.material
-            factors = {
-                key: float(look.scalar_properties[of]) for key, of in FACTORS.items() if of in look.scalar_properties
-            }
-            if "base_color" in look.vector_properties:
-                factors["baseColorFactor"] = np.clip(look.vector_properties["base_color"], 0, 1).tolist()
-            if "albedo" in look.texture_maps:
-                images = [look.texture_maps["albedo"].as_tensor().cpu().numpy()]
-    else:
+    images, material, factors = list[Any](), np.zeros(n, int), dict[str, Any]()
+    if not tensor:
         corners, ids = np.asarray(mesh.triangle_uvs), np.asarray(mesh.triangle_material_ids)
         # Open3D turns the images of its legacy meshes upside down when it reads them
-        images = [None if image.is_empty() else np.asarray(image)[::-1] for image in mesh.textures] or images
-        if len(ids) == n and ids.min(initial=0) >= 0:
-            material = ids
-            images += [None] * (ids.max(initial=0) + 1 - len(images))
+        images = [None if image.is_empty() else np.asarray(image)[::-1] for image in mesh.textures]
+        material = ids if len(ids) == n and ids.min(initial=0) >= 0 else material
+    else:
+        corners, look = mesh.triangle["texture_uvs"].cpu().numpy().reshape(-1, 2), mesh.material
+        if "albedo" in look.texture_maps:
+            images = [look.texture_maps["albedo"].as_tensor().cpu().numpy()]
+        factors = {key: look.scalar_properties[name] for key, name in FACTORS.items() if name in look.scalar_properties}
+        if "base_color" in look.vector_properties:
+            factors["baseColorFactor"] = np.clip(look.vector_properties["base_color"], 0, 1).tolist()
     if len(corners) != 3 * n:
         return None
-    shown = [None if image is None else in_bytes(image) for image in images]
-    return Texture(corners * [1, -1] + [0, 1], material, shown, factors)
-
-
-def in_bytes(image: np.ndarray) -> np.ndarray:
-    """An image of 8 or 16 bits, or of floats from 0 to 1, in 8 bits."""
-    if image.dtype == np.uint8:
-        return image
-    top = np.iinfo(image.dtype).max if image.dtype.kind == "u" else 1
-    return np.clip(np.round(image / top * 255), 0, 255).astype(np.uint8)
+    images += [None] * (material.max(initial=0) + 1 - len(images))
+    images = [None if image is None or image.dtype != np.uint8 else image for image in images]
+    return Texture(corners * [1, -1] + [0, 1], material, images, factors)
 
 
 def png(image: np.ndarray) -> np.ndarray:
