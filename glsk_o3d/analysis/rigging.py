@@ -1,6 +1,5 @@
 """The armature of a skeleton for animation: its joints, and the bone that each bone hangs on."""
 
-import heapq
 import itertools
 from typing import Any, NamedTuple
 
@@ -10,7 +9,7 @@ from ..curve.merging import merge_into
 from ..curve.rooted import numbered_from
 from ..data.skeleton import Skeleton
 from ..errors import InvalidParameterError
-from ..geometry.polylines import arc_lengths, chord_distances, place_at
+from ..geometry.polylines import arc_lengths, place_at, significance
 from ..geometry.vectors import TINY, Floats, norm
 from .mirror import Plane, mirrored_branches
 
@@ -45,7 +44,7 @@ def armature(forest: Skeleton, joints: int | None = None, plane: Plane | None = 
         forks = [whole.degree[each.path[[0, -1]]] > 2 for each in sets]
         lengths = [_joints_along(each, fork, each.path == root) for each, fork in zip(sets, forks, strict=True)]
     else:
-        lengths = _telling_lengths(whole, sets, root, joints)
+        lengths = _telling_lengths(sets, int(ends.sum()), root, joints)
     joint = np.where(ends, np.cumsum(ends) - 1, -1)  # of each vertex
     end_places = whole.vertices.copy()
     places, radii, edges, n = [], [whole.radii[ends]], [np.empty((0, 2), int)], int(ends.sum())
@@ -87,46 +86,26 @@ def _mirrored_sets(skeleton: Skeleton, plane: Plane | None) -> list[_MirroredSet
     return sets
 
 
-def _telling_lengths(skeleton: Skeleton, sets: list[_MirroredSet], root: int, joints: int) -> list[np.ndarray]:
-    """Lengths along the curves of sets of branches of the joints that tell most of the curve, so many in all."""
-    chosen = [sorted({0, len(each.curve) - 1, *np.flatnonzero(each.path == root).tolist()}) for each in sets]
-    n = int((skeleton.degree != 2).sum()) + sum(
-        (len(rows) - 2) * len(each.rows) for each, rows in zip(sets, chosen, strict=True)
-    )
+def _telling_lengths(sets: list[_MirroredSet], n: int, root: int, joints: int) -> list[np.ndarray]:
+    """Lengths along the curves of sets of branches of the joints that tell most of the curve, so many with n ends."""
+    kept = [np.union1d([0, len(each.curve) - 1], np.flatnonzero(each.path == root)) for each in sets]
+    n += sum((len(rows) - 2) * len(each.rows) for rows, each in zip(kept, sets, strict=True))
     if joints < n:
         raise InvalidParameterError(
             f"joints = {joints}: the skeleton has {n} ends and junctions, the root among them: ask for as many, "
             "or drop branches first (editing.prune, --prune-length)"
         )
-    queue: list[tuple[float, int, int, int, int]] = []
-
-    def offer(number: int, *parts: tuple[int, int]) -> None:
-        for first, last in parts:
-            weight, place = _telling_place(sets[number].curve, sets[number].radii, first, last)
-            heapq.heappush(queue, (-weight, number, first, place, last))
-
-    for number, rows in enumerate(chosen):
-        offer(number, *itertools.pairwise(rows))
-    while queue and n < joints:
-        weight, number, first, place, last = heapq.heappop(queue)
-        if weight < 0 and n + len(sets[number].rows) <= joints:
-            n += len(sets[number].rows)
-            chosen[number].append(place)
-            offer(number, (first, place), (place, last))
-    return [arc_lengths(each.curve)[sorted(rows)] for each, rows in zip(sets, chosen, strict=True)]
-
-
-def _telling_place(curve: np.ndarray, radii: np.ndarray, first: int, last: int) -> tuple[float, int]:
-    """How much a joint tells of a curve between two others, as a length, 0 if they are too near, and its place.
-
-    That is its distance from the chord (Douglas and Peucker 1973), and a share of the length of the shorter part.
-    """
-    along = arc_lengths(curve[first : last + 1])
-    shorter = np.minimum(along, along[-1] - along)
-    weight = chord_distances(curve[first : last + 1]) + LONG_BONE * shorter
-    weight[shorter < CLOSEST_JOINTS * np.nan_to_num(radii[first : last + 1])] = 0
-    place = int(weight.argmax())
-    return float(weight[place]), first + place
+    weights = [
+        significance(each.curve, rows, LONG_BONE, CLOSEST_JOINTS * np.nan_to_num(each.radii))
+        for each, rows in zip(sets, kept, strict=True)
+    ]
+    number = np.repeat(np.arange(len(sets)), list(map(len, weights)))
+    place, weight = np.concatenate([np.arange(len(each)) for each in weights]), np.concatenate(weights)
+    for k in np.argsort(-weight, kind="stable").tolist():
+        if 0 < weight[k] < np.inf and n + len(sets[number[k]].rows) <= joints:
+            n += len(sets[number[k]].rows)
+            kept[number[k]] = np.append(kept[number[k]], place[k])
+    return [arc_lengths(each.curve)[np.sort(rows)] for each, rows in zip(sets, kept, strict=True)]
 
 
 def _without_junctions_in_balls(forest: Skeleton) -> tuple[Skeleton, int]:

@@ -17,7 +17,7 @@ from ..data.graph import all_of_vertices
 from ..data.skeleton import Skeleton, check_skeleton, of_input
 from ..errors import InvalidParameterError
 from ..geometry.near_links import linked
-from ..geometry.polylines import arc_lengths, chord_distances
+from ..geometry.polylines import arc_lengths, significance
 from ..geometry.vectors import norm
 from ..parameters import check_number
 
@@ -268,29 +268,13 @@ def simplify(skeleton: Skeleton, *, tolerance: float = 0.0) -> Skeleton:
     parallel = Counter(ends)
     for path, pair in zip(skeleton.branches, ends, strict=True):
         curve = skeleton.vertices[path]
-        significance = _significance(curve)
-        inner = significance[1:-1]
+        weight = significance(curve, [0, len(curve) - 1])
+        inner = weight[1:-1]
         if path[0] == path[-1]:  # a ring is at least a triangle
             inner[np.argsort(inner)[-2:]] = np.inf
         elif parallel[pair] > 1 and len(path) > 2:
             inner[np.argmax(inner)] = np.inf
-        along, kept = arc_lengths(curve), np.flatnonzero(significance > tolerance)
+        along, kept = arc_lengths(curve), np.flatnonzero(weight > tolerance)
         nearest = np.abs(along[1:-1, None] - along[kept]).argmin(axis=1)
         group[path[1:-1]] = path[kept[nearest]]
     return merge_into(skeleton, group)
-
-
-def _significance(curve: np.ndarray) -> np.ndarray:
-    """Largest tolerance at which every place of a curve stays, infinite at its ends, (p,) float array."""
-    significance = np.full(len(curve), np.inf)
-    parts = [(0, len(curve) - 1)]
-    while parts:
-        first, last = parts.pop()
-        if last - first < 2:
-            continue
-        distance = chord_distances(curve[first : last + 1])[1:-1]
-        farthest = first + 1 + int(distance.argmax())
-        # no more than that of the ends of its part, without which it would not be asked
-        significance[farthest] = min(float(distance.max()), significance[first], significance[last])
-        parts += [(first, farthest), (farthest, last)]
-    return significance

@@ -1,6 +1,8 @@
 """Paths of a graph, lengths along polylines, and the places on the edges of a graph that are nearest to points."""
 
 from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -47,11 +49,28 @@ def place_at(path: np.ndarray, lengths: np.ndarray, length: float | np.ndarray) 
     return np.stack([np.interp(length, lengths, column) for column in path.T], axis=-1)
 
 
-def chord_distances(curve: np.ndarray) -> Floats:
-    """Distance of every place of a curve (p, 3) from the straight piece between its ends, (p,) float array."""
-    offset, chord = curve - curve[0], curve[-1] - curve[0]
-    along = np.clip(offset @ chord / max(chord @ chord, TINY), 0, 1)
-    return norm(offset - along[:, None] * chord)
+def significance(curve: np.ndarray, kept: Sequence[int] | np.ndarray, long: float = 0.0, near: Any = 0.0) -> Floats:
+    """Largest tolerance at which every place of a curve (p, 3) stays (Douglas and Peucker 1973), (p,) float array.
+
+    It is infinite at those `kept`, its ends among them. To the distance from the chord a share `long` of the length to
+    the nearer end of the part is added; places that are less than `near`, (p,) or one length, from it have 0.
+    """
+    weights, near, parts = np.zeros(len(curve)), np.broadcast_to(near, len(curve)), [*pairwise(kept)]
+    weights[kept] = np.inf
+    while parts:
+        first, last = parts.pop()
+        if last - first < 2:
+            continue
+        part, along = curve[first : last + 1], arc_lengths(curve[first : last + 1])
+        offset, chord, shorter = part - part[0], part[-1] - part[0], np.minimum(along, along[-1] - along)
+        share = np.clip(offset @ chord / max(chord @ chord, TINY), 0, 1)
+        weight = norm(offset - share[:, None] * chord) + long * shorter
+        weight[(shorter < near[first : last + 1])] = 0
+        farthest = first + 1 + int(weight[1:-1].argmax())
+        # no more than that of the ends of its part, without which it would not be asked
+        weights[farthest] = min(weight[farthest - first], weights[first], weights[last])
+        parts += [(first, farthest), (farthest, last)]
+    return weights
 
 
 def relative_distance(
