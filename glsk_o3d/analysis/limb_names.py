@@ -34,16 +34,14 @@ def bone_names(bones: Skeleton, plane: Plane | None = None, up: str = "z", sides
             labels[j] = labels[i]
     labels |= named
     label_of_bone = [labels[row] for row in branch.tolist()]
-    if "neck" not in named.values():  # the bone at the end of the head's branch is the head
-        for bone, label in enumerate(label_of_bone):
-            if label == "head" and bones.degree[bones.edges[bone]].min() > 1:
-                label_of_bone[bone] = "neck"
-    group = np.unique([label + suffixes[row] for label, row in zip(label_of_bone, branch, strict=True)], False, True)[1]
-    numbers = group_rank(group, len(label_of_bone)).tolist()
-    return [
-        f"{label}.{number:03d}{suffixes[row]}"
-        for label, number, row in zip(label_of_bone, numbers, branch, strict=True)
-    ]
+    of_head = [bone for bone, label in enumerate(label_of_bone) if label == "head"]
+    at_end = [bone for bone in of_head if bones.degree[bones.edges[bone]].min() == 1]
+    if at_end and "neck" not in named.values():  # the head's branch begins at the shoulders
+        for bone in {*of_head} - {*at_end}:
+            label_of_bone[bone] = "neck"
+    named_bones = [*zip(label_of_bone, [suffixes[row] for row in branch], strict=True)]
+    numbers = group_rank(np.unique(named_bones, axis=0, return_inverse=True)[1].reshape(-1), len(branch))
+    return [f"{label}.{number:03d}{side}" for (label, side), number in zip(named_bones, numbers.tolist(), strict=True)]
 
 
 def _limbs(bones: Skeleton, partner: np.ndarray, up: str) -> tuple[dict[int, str], Floats]:
@@ -63,42 +61,43 @@ def _limbs(bones: Skeleton, partner: np.ndarray, up: str) -> tuple[dict[int, str
     legs = [pair for pair in pairs if lowest[list(pair)].max() < z.min() + LOW * size]
     length = np.bincount(bones.branch_of_edge, bones.edge_lengths, len(rows))
     arms = [pair for pair in pairs if pair not in legs and length[list(pair)].min() > LEAST_ARM * size]
-    tips = np.flatnonzero(bones.degree[ends] == 1)
-    outside = tips[[_is_outside(bones, row, int(ends[row])) for row in tips.tolist()]]
-    low = outside[(z[ends[outside]] < z.min() + LOW * size) & ~centred[outside]]
-    onward = np.concatenate([starts[centred], starts[[row for row, _ in legs]]])  # beyond which the trunk goes on
-    last = np.union1d(outside, np.setdiff1d(rows, tips))
-    tips = last[centred[last] & ~np.isin(ends[last], onward)]
-    head = _head(z[ends[tips]], bones.radii[ends[tips]], z.min() + size / 2)
-    if head is None or len(legs) not in (1, 2) or len(low) != 2 * len(legs) or bones.n_components > 1:
+    tips = [row for row in rows[bones.degree[ends] == 1].tolist() if _is_outside(bones, row, int(ends[row]))]
+    feet = [row for row in tips if z[ends[row]] < z.min() + LOW * size and not centred[row]]
+    beyond = [*starts[centred], *(starts[row] for row, _ in legs)]  # from there on the trunk goes on
+    tips = [row for row in {*tips, *rows[bones.degree[ends] > 1].tolist()} if centred[row] and ends[row] not in beyond]
+    chosen = _head(z[ends[tips]], bones.radii[ends[tips]], z.min() + size / 2)
+    if chosen is None or len(legs) not in (1, 2) or len(feet) != 2 * len(legs) or bones.n_components > 1:
         return {}, FRONT[up]
-    head, tails = tips[head], np.delete(tips, head)
-
-    def from_head(pair: tuple[int, int]) -> tuple[float, float]:
-        route = bones.vertices[bones.path(int(starts[pair[0]]), int(ends[head]))]
-        return float(norm(np.diff(route, axis=0)).sum()), float(
-            norm(bones.vertices[ends[list(pair)]] - route[-1]).min()
-        )
-
-    legs, arms = sorted(legs, key=from_head), sorted(arms, key=from_head)[-1:] if len(legs) == 1 else []
+    head = tips.pop(chosen)
+    legs, arms = (sorted(found, key=lambda pair: _gap(bones, ends, pair, head)) for found in (legs, arms))
+    arms = arms[-1:] if len(legs) == 1 else []
     hips, shoulders = (int(starts[pair[0]]) for pair in (legs[-1], (arms or legs)[0]))
     named: dict[int, str] = {}
     for name, goal in (("neck", int(starts[head])), ("spine", hips)):
         route = bones.path(shoulders, goal)
-        named |= {int(row): name for row in np.flatnonzero(np.isin(starts, route) & np.isin(ends, route))}
+        named |= dict.fromkeys(rows[np.isin(starts, route) & np.isin(ends, route)].tolist(), name)
     kinds = ("front_leg", "hind_leg") if len(legs) == 2 else ("leg", "arm")
     for kind, pair in zip(kinds, [*legs, *arms], strict=False):
         named |= dict.fromkeys(pair, kind)
-    named |= dict.fromkeys(tails.tolist() if len(tails) == 1 else (), "tail") | {int(head): "head"}
-    feet = [
-        bones.vertices[path[-2:]] if path[-1] == end else bones.vertices[path[1::-1]]
-        for path, end in ((bones.branches[row], ends[row]) for row in legs[-1])
-    ]
-    ahead = bones.vertices[ends[head]] - np.mean([foot[1] for foot in feet], axis=0)
+    named |= dict.fromkeys(tips if len(tips) == 1 else (), "tail") | {head: "head"}
+    return named, _ahead(bones, ends, legs, head, up)
+
+
+def _gap(bones: Skeleton, ends: np.ndarray, pair: tuple[int, int], head: int) -> float:
+    """Mean distance of the ends of a pair of limbs from that of the head."""
+    return float(norm(bones.vertices[ends[list(pair)]] - bones.vertices[ends[head]]).mean())
+
+
+def _ahead(bones: Skeleton, ends: np.ndarray, legs: list[tuple[int, int]], head: int, up: str) -> Floats:
+    """The level direction in which a body looks: that of a biped's feet, or from the hind feet to the head."""
+    feet, goal = ends[list(legs[-1])], bones.vertices[ends[head]]
     if len(legs) == 1:
-        ahead = np.mean([foot[1] - foot[0] for foot in feet], axis=0)
+        last = [bones.edges[(bones.edges == foot).any(axis=1)].sum() - foot for foot in feet]  # the joints before
+        feet, goal = np.array(last), bones.vertices[feet].mean(axis=0)
+    ahead: Floats = goal - bones.vertices[feet].mean(axis=0)
     ahead = ahead - ahead @ VERTICAL[up] * VERTICAL[up]
-    return named, ahead if len(legs) == 2 or np.linalg.norm(ahead) > LEAST_FOOT * size else FRONT[up]
+    least = LEAST_FOOT * np.ptp(bones.vertices @ VERTICAL[up]) if len(legs) == 1 else 0
+    return ahead if np.linalg.norm(ahead) > least else FRONT[up]
 
 
 def _is_outside(bones: Skeleton, row: int, end: int) -> bool:

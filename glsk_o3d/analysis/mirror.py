@@ -17,6 +17,7 @@ TRIED_NORMALS = 100  # fitted: directions, a dozen degrees apart on the half sph
 REFINED_NORMALS = 4  # fitted: of them, the best
 COMPARED_PART = np.linspace(0.3, 1, 8)  # fitted: of two branches; where limbs begin, the trunk shifts them
 PAIR_TOLERANCE = 0.2  # fitted: distance of a branch from the mirror image of its partner, over its length
+MOST_PAIRED = 2000  # speed: branches; of a plant with more, none has a mirror image
 NO_PARTNER = 3.0  # derived: more than two partners at the limit, so that no pair is given up for one
 
 
@@ -65,8 +66,8 @@ def mirrored_branches(skeleton: Skeleton, plane: Plane) -> np.ndarray:
     curves = [skeleton.vertices[path] for path in skeleton.branches]
     lengths = [arc_lengths(curve) for curve in curves]
     samples = [place_at(curve, at, at[-1] * COMPARED_PART) for curve, at in zip(curves, lengths, strict=True)]
-    if len(samples) == 0:
-        return np.empty(0, int)
+    if not 0 < len(samples) <= MOST_PAIRED:
+        return np.full(len(samples), -1)
     mirrored = np.stack([plane.mirrored(places) for places in samples]).reshape(len(samples), -1)
     distance = cdist(mirrored, np.stack(samples).reshape(len(samples), -1)) / len(COMPARED_PART) ** 0.5
     length = np.array([at[-1] for at in lengths])

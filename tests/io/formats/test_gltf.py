@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from glsk_o3d import Skeleton, to_tubes
+from glsk_o3d import Skeleton, skeletonize, to_tubes
 from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from glsk_o3d.io.formats.gltf import save_rig
+from glsk_o3d.samples import sauropod
 
 KINDS = {5121: "u1", 5123: "u2", 5125: "u4", 5126: "f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -150,6 +151,18 @@ def test_places_in_a_texture_without_one_are_kept(rig):
     file = rig(Skeleton([[0.5, 0.5, 0.2], [0.5, 0.5, 0.8]], [[0, 1]], [0.3, 0.3], (), (), ()), box)
     assert file.meshes[0].primitives[0].attributes.TEXCOORD_0 is not None
     assert file.images == []
+
+
+def test_an_animal_has_limbs_with_names_and_its_handle_is_cut_where_it_is_thin(rig):
+    file = rig(skeletonize(sauropod(3000).points), joints=25)
+    matrices = world(file)
+    place = {node.name: matrices[i][:3, 3] for i, node in enumerate(file.nodes)}
+    assert len(rig.armature.vertices) == 25
+    for part, axis, sign in (("head.000", 0, 1), ("front_leg.001_left", 2, -1), ("hind_leg.001_right", 2, 1)):
+        assert sign * place[part][axis] > 0.05  # in the file z of the cloud is y, and its y is -z
+    assert place["head.000"][0] > place["neck.001"][0] > place["front_leg.001_right"][0] > place["hind_leg.001_left"][0]
+    assert place["hind_leg.001_left"][0] > place["tail.002"][0]
+    assert any(name.startswith("spine") for name in place)
 
 
 def test_without_radii_the_points_are_the_surface(rig):
