@@ -1,12 +1,14 @@
 """Forest measures of a tree: height, stem, volume by order; and doubts about them."""
 
 import warnings
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from ..errors import SkeletonWarning
+from ..data.skeleton import Skeleton
+from ..errors import GlskError, SkeletonWarning
 from ..geometry.vectors import TINY
 from .circles import CircleFit
 from .crowns import DiameterClass, crown_hulls, diameter_classes
@@ -17,7 +19,7 @@ TALLEST_TREE = 116.07  # published: metres, Hyperion, the tallest tree known, as
 FORM_FACTOR = 2.0  # derived: wood over a cylinder as thick as at 1.3 m and as high as the tree; branches as thick as
 # the trunk together (Leonardo) that reach to the top fill one, and their bends and the foot do not double that
 MOST_TRACED = 0.5  # derived: of the length; above that the volume says nothing of most of the tree
-NO_SURFACE = (
+NEEDS_LEAF_OFF = (
     "has no surface, and no volume: twigs thinner than the points are apart, or leaves, which the cloud does not tell "
     "apart: needs leaf-off, or more points"
 )
@@ -137,7 +139,7 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
     traced_share = known * float(lengths[traced].sum() / max(lengths.sum(), TINY))
     doubts = _doubts(-low / max(high - low, TINY), highest, section, problem, wood, tree.up, unit)
     if traced_share > MOST_TRACED:
-        doubts += (f"{100 * traced_share:.0f} % of the length {NO_SURFACE}",)
+        doubts += (f"{100 * traced_share:.0f} % of the length {NEEDS_LEAF_OFF}",)
     for doubt in doubts:
         warnings.warn(doubt, SkeletonWarning, stacklevel=2)
     return TreeMeasures(
@@ -161,6 +163,16 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
         classes=diameter_classes(pieces, unit),
         doubts=doubts,
     )
+
+
+def measures_of_grown(skeleton: Skeleton, unit: float = 1.0, up: str | None = None) -> TreeMeasures | None:
+    """The measures of a tree that a pipeline grew from a root, without warnings; None of anything else."""
+    if not skeleton.report.root:
+        return None
+    with warnings.catch_warnings(), suppress(GlskError, np.linalg.LinAlgError):
+        warnings.simplefilter("ignore")
+        return tree_measures(skeleton, unit=unit, up=up)
+    return None
 
 
 def _doubts(

@@ -18,7 +18,7 @@ STEM_SPAN = 0.5  # fitted: metres up and down, over which the stem has its direc
 FEWEST_ON_CIRCLE = 12  # fitted: on a circle, of which fewer may be anything
 LEAST_ARC = 60.0  # derived: degrees of a circle; a chord of less leaves the surface by an eighth of the radius
 TAPER_STEPS = 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0  # published: metres between the sections of a stem
-MOST_SECTIONS = 20  # precision: of a taper, with the shortest of these steps that needs no more
+MOST_TAPER_SECTIONS = 20  # precision: of a taper, with the shortest of these steps that needs no more
 UNKNOWN = CircleFit(np.nan, np.nan, 0)
 
 
@@ -90,9 +90,12 @@ class Stem:
 
     def taper(self) -> tuple[StemSection, ...]:
         """Sections at round heights, up to twenty."""
-        step = next((step for step in TAPER_STEPS if self.top < step * (MOST_SECTIONS + 1)), self.top / MOST_SECTIONS)
+        step = next(
+            (step for step in TAPER_STEPS if self.top < step * (MOST_TAPER_SECTIONS + 1)),
+            self.top / MOST_TAPER_SECTIONS,
+        )
         sections = []
-        for height in (step * np.arange(1, MOST_SECTIONS + 1)).round(9).tolist():
+        for height in (step * np.arange(1, MOST_TAPER_SECTIONS + 1)).round(9).tolist():
             row = self._piece_at(height)
             if row is not None:
                 circle = self.circle_at(height)[0]

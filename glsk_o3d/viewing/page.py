@@ -4,12 +4,14 @@ import json
 import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
 from datetime import datetime, timezone
 from importlib.resources import files
 from typing import Any
 
 import numpy as np
 
+from ..analysis.forestry import TreeMeasures, measures_of_grown
 from ..analysis.summary import ITERATION_COLUMNS, iteration_rows
 from ..data.decisions import coordinates
 from ..data.report import Markup, Report, markup
@@ -28,6 +30,19 @@ HOVER = (
     "<extra></extra>"
 )
 
+TREE_ROWS = {
+    "height": "height, m",
+    "stem_diameter": "stem diameter at 1.3 m, m",
+    "crown_base": "crown base, m",
+    "crown_area": "crown area (convex hull), m\u00b2",
+    "crown_volume": "crown volume (convex hull), m\u00b3",
+    "length_with_traced": "length with traced parts, m",
+    "length_without_traced": "length without traced parts, m",
+    "volume_with_traced": "volume with traced parts, m\u00b3",
+    "volume_without_traced": "volume without traced parts, m\u00b3",
+}
+"""The measures of a tree, with what they are called."""
+
 
 def save_report(
     skeleton: Skeleton,
@@ -35,12 +50,14 @@ def save_report(
     *,
     title: str = "Curve skeleton",
     facts: Mapping[str, Mapping[str, str]] | None = None,
+    unit: float = 1.0,
+    up: str | None = None,
 ) -> None:
     """Write a page that shows a skeleton and the run that made it.
 
     The page is one HTML file of 5 MB that works offline in any browser with WebGL: cloud, skeleton and radius tubes to
-    turn and zoom by plotly, which comes with Open3D; the run's numbers, warnings, recipe and versions. Of larger clouds
-    20 000 points are shown, drawn at random.
+    turn and zoom by plotly, which comes with Open3D; the run's numbers, warnings, recipe and versions; of a tree
+    that was grown from a root, its measures. Of larger clouds 20 000 points are shown, drawn at random.
 
     Parameters
     ----------
@@ -51,6 +68,8 @@ def save_report(
         Shown literally.
     facts : dict of str to dict of str to str, optional
         More sections: a table of names and texts below each heading, such as the numbers of a cross-check.
+    unit, up : float, str, optional
+        One unit of the cloud in metres, and the axis that points up, for the measures of a tree; see `tree_measures`.
 
     Raises
     ------
@@ -64,11 +83,13 @@ def save_report(
     >>> glsk.save_report(glsk.skeletonize(torus(600).points), "report.html", title="A torus")  # doctest: +SKIP
     """
     check_ending(path, "report is a page", ".html", ".htm")
-    page = _page(skeleton.whole, title, facts or {}).encode("utf-8", "replace")  # a file name may be no Unicode
+    page = _page(skeleton.whole, title, facts or {}, measures_of_grown(skeleton, unit, up)).encode(
+        "utf-8", "replace"
+    )  # a file name may be no Unicode
     write_atomically(path, lambda temporary: temporary.write_bytes(page))
 
 
-def _page(skeleton: Skeleton, title: str, facts: Mapping[str, Mapping[str, str]]) -> str:
+def _page(skeleton: Skeleton, title: str, facts: Mapping[str, Mapping[str, str]], measures: TreeMeasures | None) -> str:
     shown = thinned(skeleton.points, MOST_DRAWN_POINTS)
     finite = np.isfinite(skeleton.points).all(axis=1).sum()
     report, kind = skeleton.report, "Curve skeleton" if len(skeleton.vertices) else "Point cloud"
@@ -81,10 +102,10 @@ def _page(skeleton: Skeleton, title: str, facts: Mapping[str, Mapping[str, str]]
         subtitle=f"{kind} · glsk-o3d {report.versions.get('glsk-o3d', '')} · {date}",
         style=Markup((assets / "report.css").read_text("utf-8")),
         counts=[markup("<div><dt>{}</dt><dd>{}</dd></div>", *item) for item in counts(skeleton).items()],
-        warnings=warnings(report.warnings),
+        warnings=warnings([*report.warnings, *(measures.doubts if measures else ())]),
         view=Markup(_view(skeleton, skeleton.points[shown])),
         thinning=f"The view shows {len(shown):,} of {finite:,} points." if len(shown) < finite else "",
-        sections=[*more, contraction(report), topology(report), support(report), origin(report)],
+        sections=[*more, tree(measures), contraction(report), topology(report), support(report), origin(report)],
     )
 
 
@@ -157,6 +178,27 @@ def warnings(messages: Iterable[str]) -> Markup:
     """The warnings, each once."""
     rows = [markup("<li>{}</li>", text) for text in dict.fromkeys(messages)]
     return markup('<div class="warnings" role="note"><strong>Warnings</strong><ul>{}</ul></div>' if rows else "", rows)
+
+
+def tree(measures: TreeMeasures | None) -> Markup:
+    """The measures of a tree, the taper of its stem, and its wood by diameter; nothing without."""
+    if measures is None:
+        return Markup()
+    rows = [(label, f"{getattr(measures, name):.4g}".replace("nan", "not known")) for name, label in TREE_ROWS.items()]
+    rows.insert(1, ("arc of the stem with points, degrees", f"{measures.stem_arc:.0f}".replace("nan", "not known")))
+    taper = [
+        [f"{value:.3g}".replace("nan", "-") for value in (each.height, each.diameter, each.cylinder_diameter)]
+        for each in measures.taper
+    ]
+    classes = [[f"{value:.4g}" for value in asdict(each).values()] for each in measures.classes]
+    heads = ("from m", "to m", *(TREE_ROWS[name] for name in list(asdict(measures.classes[0]))[2:]))
+    content = [
+        _table((), rows),
+        _section("Taper", _table(("height m", "diameter m", "of the cylinder m"), taper)),
+        _section("Diameter classes", _table(heads, classes)),
+    ]
+    unit = f"One unit of the cloud is {measures.unit:g} m. Traced parts have no surface: their volume is an estimate."
+    return _section("Tree", Markup("".join(content)), unit)
 
 
 def contraction(report: Report) -> Markup:
