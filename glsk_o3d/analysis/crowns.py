@@ -1,7 +1,5 @@
 """The crown of a tree, and its wood by diameter."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
@@ -11,55 +9,30 @@ from .trees import Cylinders
 CLASS_WIDTH = 0.05  # published: metres; foresters' classes of diameters
 
 
-@dataclass(frozen=True)
-class DiameterClass:
-    """What a tree has of parts between two diameters, in metres and cubic metres.
+def diameter_classes(pieces: Cylinders, unit: float = 1.0, width: float = CLASS_WIDTH) -> tuple[dict[str, float], ...]:
+    """Length and volume of cylinders by diameter, in metres: a dict for each class that is not empty.
 
-    Attributes
-    ----------
-    low, high : float
-        Diameters; the class has the lower one.
-    length_with_traced, length_without_traced, volume_with_traced, volume_without_traced : float
-        As of `TreeMeasures`.
-    """
-
-    low: float
-    high: float
-    length_with_traced: float
-    length_without_traced: float
-    volume_with_traced: float
-    volume_without_traced: float
-
-
-def diameter_classes(pieces: Cylinders, unit: float = 1.0, width: float = CLASS_WIDTH) -> tuple[DiameterClass, ...]:
-    """Length and volume of cylinders by classes of diameter, without empty ones.
-
-    Parameters
-    ----------
-    pieces : Cylinders
-    unit, width : float
-        One unit of the cloud, and the width of a class, in metres.
-
-    Returns
-    -------
-    tuple of DiameterClass
+    Its names are ``low`` and ``high``, and those of the sums of `TreeMeasures`. A diameter between two classes is in
+    the upper one. `unit` and `width` are one unit of the cloud, and the width of a class, in metres.
 
     Examples
     --------
     >>> from glsk_o3d import pipelines
-    >>> from glsk_o3d.samples import tube
     >>> from glsk_o3d.analysis import cylinders
+    >>> from glsk_o3d.samples import tube
     >>> log = cylinders(pipelines.tree("x")(tube(2000, length=2, radius=0.11).points))
-    >>> [round(float(each.low), 2) for each in diameter_classes(log)]
+    >>> [round(each["low"], 2) for each in diameter_classes(log)]
     [0.2]
     """
     number = np.floor(2 * unit * pieces.radius / width).astype(int)
     seen, length, volume = pieces.confidence != 0, unit * pieces.length, unit**3 * pieces.volume
     classes = []
     for row in np.unique(number).tolist():
-        inside = number == row
-        sums = [float(sizes[inside & chosen].sum()) for sizes in (length, volume) for chosen in (inside, seen)]
-        classes.append(DiameterClass(row * width, (row + 1) * width, *sums))
+        sums = {"low": row * width, "high": (row + 1) * width}
+        for name, sizes in (("length", length), ("volume", volume)):
+            sums[f"{name}_with_traced"] = float(sizes[number == row].sum())
+            sums[f"{name}_without_traced"] = float(sizes[(number == row) & seen].sum())
+        classes.append(sums)
     return tuple(classes)
 
 

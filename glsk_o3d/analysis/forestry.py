@@ -11,8 +11,8 @@ from ..data.skeleton import Skeleton
 from ..errors import GlskError, SkeletonWarning
 from ..geometry.vectors import TINY
 from .circles import CircleFit
-from .crowns import DiameterClass, crown_hulls, diameter_classes
-from .stems import StemSection, stem
+from .crowns import crown_hulls, diameter_classes
+from .stems import stem
 
 BREAST_HEIGHT = 1.3  # published: metres above the ground at which foresters measure stems
 TALLEST_TREE = 116.07  # published: metres, Hyperion, the tallest tree known, as measured in 2019
@@ -52,10 +52,9 @@ class TreeMeasures:
         unknown.
     root, up, unit : (x, y, z), str, float
         The foot of the stem in the cloud's units, the axis that points up, and the metres of one unit.
-    taper : tuple of StemSection
-        Diameters of the stem at round heights.
-    classes : tuple of DiameterClass
-        Length and volume by diameter, in classes of 5 cm.
+    taper, classes : tuple of dict of str to float
+        Diameters of the stem at round heights, see `Stem.taper`; length and volume in classes of diameter of 5 cm, see
+        `diameter_classes`.
     doubts : tuple of str
         The warnings about implausible results.
     """
@@ -76,8 +75,8 @@ class TreeMeasures:
     root: tuple[float, float, float]
     up: str
     unit: float
-    taper: tuple[StemSection, ...]
-    classes: tuple[DiameterClass, ...]
+    taper: tuple[dict[str, float], ...]
+    classes: tuple[dict[str, float], ...]
     doubts: tuple[str, ...]
 
     def sums(self) -> dict[str, Any]:

@@ -22,34 +22,13 @@ MOST_TAPER_SECTIONS = 20  # precision: of a taper, with the shortest of these st
 UNKNOWN = CircleFit(np.nan, np.nan, 0)
 
 
-@dataclass(frozen=True)
-class StemSection:
-    """The stem at a height.
-
-    Attributes
-    ----------
-    height, diameter : float
-        Above the ground, and of the circle through the points there, in metres; the diameter is NaN if unknown.
-    arc : float
-        Degrees of the circle with points.
-    cylinder_diameter : float
-        Of the cylinder there, in metres, from the radii of the skeleton.
-    """
-
-    height: float
-    diameter: float
-    arc: float
-    cylinder_diameter: float
-
-
 @dataclass(frozen=True, eq=False)
 class Stem:
     """The stem of a tree, measured in metres above the ground at its foot.
 
     Attributes
     ----------
-    skeleton : Skeleton
-    pieces : Cylinders
+    skeleton, pieces : Skeleton, Cylinders
         Of the whole tree, in the units of the cloud.
     near : (n,) int array
         Rows of the skeleton's points that are no outliers.
@@ -88,8 +67,8 @@ class Stem:
         check_number("height", height)
         return 2 * self.circle_at(height)[0].radius
 
-    def taper(self) -> tuple[StemSection, ...]:
-        """Sections at round heights, up to twenty."""
+    def taper(self) -> tuple[dict[str, float], ...]:
+        """Height, diameter, arc and diameter of the cylinder, each by its name, at round heights: up to twenty."""
         step = next(
             (step for step in TAPER_STEPS if self.top < step * (MOST_TAPER_SECTIONS + 1)),
             self.top / MOST_TAPER_SECTIONS,
@@ -100,7 +79,8 @@ class Stem:
             if row is not None:
                 circle = self.circle_at(height)[0]
                 thickness = 2 * self.unit * float(self.pieces.radius[row])
-                sections.append(StemSection(height, 2 * circle.radius, circle.arc, thickness))
+                section = dict(height=height, diameter=2 * circle.radius, arc=circle.arc)
+                sections.append(section | {"cylinder_diameter": thickness})
         return tuple(sections)
 
     def _piece_at(self, height: float) -> int | None:
@@ -137,22 +117,7 @@ class Stem:
 
 
 def stem(skeleton: Any, root: Any = None, *, up: str | None = None, unit: float = 1.0) -> Stem:
-    """The stem of a tree, to measure its diameter at any height.
-
-    Parameters
-    ----------
-    skeleton, root, up, unit
-        As of `tree_measures`.
-
-    Returns
-    -------
-    Stem
-
-    Raises
-    ------
-    InvalidParameterError
-        As of `tree_measures`.
-    """
+    """The stem of a tree, to measure its diameter at any height; parameters and errors are those of `tree_measures`."""
     up, skeleton = up_axis(skeleton, root, up), skeleton.whole
     check_number("unit", unit, low=0, open_low=True)
     pieces, near = cylinders(skeleton, root, up), points_near(skeleton)

@@ -4,7 +4,6 @@ import json
 import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict
 from datetime import datetime, timezone
 from importlib.resources import files
 from typing import Any
@@ -29,19 +28,7 @@ HOVER = (
     "vertex %{customdata[0]} · branch %{customdata[1]} · radius %{customdata[2]:.4g} · confidence %{customdata[3]:.2f}"
     "<extra></extra>"
 )
-
-TREE_ROWS = {
-    "height": "height, m",
-    "stem_diameter": "stem diameter at 1.3 m, m",
-    "crown_base": "crown base, m",
-    "crown_area": "crown area (convex hull), m\u00b2",
-    "crown_volume": "crown volume (convex hull), m\u00b3",
-    "length_with_traced": "length with traced parts, m",
-    "length_without_traced": "length without traced parts, m",
-    "volume_with_traced": "volume with traced parts, m\u00b3",
-    "volume_without_traced": "volume without traced parts, m\u00b3",
-}
-"""The measures of a tree, with what they are called."""
+WITH_TRACED = "Traced parts have no surface: with them, length is that of paths through points, and volume an estimate."
 
 
 def save_report(
@@ -184,21 +171,17 @@ def tree(measures: TreeMeasures | None) -> Markup:
     """The measures of a tree, the taper of its stem, and its wood by diameter; nothing without."""
     if measures is None:
         return Markup()
-    rows = [(label, f"{getattr(measures, name):.4g}".replace("nan", "not known")) for name, label in TREE_ROWS.items()]
-    rows.insert(1, ("arc of the stem with points, degrees", f"{measures.stem_arc:.0f}".replace("nan", "not known")))
-    taper = [
-        [f"{value:.3g}".replace("nan", "-") for value in (each.height, each.diameter, each.cylinder_diameter)]
-        for each in measures.taper
-    ]
-    classes = [[f"{value:.4g}" for value in asdict(each).values()] for each in measures.classes]
-    heads = ("from m", "to m", *(TREE_ROWS[name] for name in list(asdict(measures.classes[0]))[2:]))
-    content = [
-        _table((), rows),
-        _section("Taper", _table(("height m", "diameter m", "of the cylinder m"), taper)),
-        _section("Diameter classes", _table(heads, classes)),
-    ]
-    unit = f"One unit of the cloud is {measures.unit:g} m. Traced parts have no surface: their volume is an estimate."
-    return _section("Tree", Markup("".join(content)), unit)
+    sums = [(name, value) for name, value in measures.sums().items() if isinstance(value, float) and name != "unit"]
+    tables = [_table(("measure", "value"), [(name.replace("_", " "), _number(value)) for name, value in sums])]
+    for heading, rows in {"Taper": measures.taper, "Diameter classes": measures.classes}.items():
+        heads = [name.replace("_", " ") for name in (rows[0] if rows else ())]
+        tables.append(_section(heading, _table(heads, [[*map(_number, row.values())] for row in rows])))
+    units = f"In metres, square and cubic metres; the arc is in degrees. One unit of the cloud is {measures.unit:g} m. "
+    return _section("Tree", Markup("".join(tables)), f"{units}{WITH_TRACED}")
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}".replace("nan", "not known")
 
 
 def contraction(report: Report) -> Markup:

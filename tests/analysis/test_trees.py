@@ -359,18 +359,18 @@ def test_taper_volume_and_classes_of_a_cone():
     for level in (0.5, 1.3, 4.0, 8.0):
         assert trunk.diameter_at(level) == pytest.approx(2 * radius * (1 - level / height), rel=0.005)
     assert np.isnan(trunk.diameter_at(11))
-    heights = [section.height for section in measures.taper]
+    heights = [section["height"] for section in measures.taper]
     np.testing.assert_allclose(heights, 0.5 * np.arange(1, 20))
     for section in measures.taper[:18]:
-        assert section.diameter == pytest.approx(2 * radius * (1 - section.height / height), rel=0.01)
-        assert section.cylinder_diameter == pytest.approx(section.diameter, abs=2 * radius * 0.12)
+        assert section["diameter"] == pytest.approx(2 * radius * (1 - section["height"] / height), rel=0.01)
+        assert section["cylinder_diameter"] == pytest.approx(section["diameter"], abs=2 * radius * 0.12)
     volume = np.pi * radius**2 * height / 3
     assert measures.volume_with_traced == measures.volume_without_traced == pytest.approx(volume, rel=0.02)
     fine = diameter_classes(cylinders(skeleton, 0), width=0.2)
-    assert [round(each.low, 9) for each in fine] == [0, 0.2, 0.4]
-    share = np.array([each.volume_with_traced for each in fine]) / volume
+    assert [round(each["low"], 9) for each in fine] == [0, 0.2, 0.4]
+    share = np.array([each["volume_with_traced"] for each in fine]) / volume
     np.testing.assert_allclose(share, np.diff([0, 1 / 27, 8 / 27, 1]), atol=0.12)  # cylinders are four radii long
-    assert sum(each.length_with_traced for each in measures.classes) == pytest.approx(measures.length_with_traced)
+    assert sum(each["length_with_traced"] for each in measures.classes) == pytest.approx(measures.length_with_traced)
 
 
 @pytest.mark.parametrize("unit", [1.0, 0.001])

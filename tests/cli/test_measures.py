@@ -81,7 +81,7 @@ def test_a_table_of_trees_has_a_row_for_each_and_the_errors(invoke, tmp_path, y,
     shown = invoke("tree", "scan.ply", "--report", "tree.html").stdout
     assert "length without traced" in shown
     page = (tmp_path / "tree.html").read_text("utf-8")
-    for label in ("length with traced parts", "volume without traced parts", "Taper", "Diameter classes"):
+    for label in ("length with traced", "volume without traced", "Taper", "Diameter classes"):
         assert label in page
     facts = json.loads(invoke("tree", "scan.ply", "--json").stdout)
     assert len(facts["taper"]) == len(measures.taper)
