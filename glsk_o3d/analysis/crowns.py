@@ -41,13 +41,10 @@ def crown_hulls(tree: Stem, base: float) -> tuple[float, float]:
 
     The crown is what belongs to branches, and the stem above the crown base, by points or else by cylinders.
     """
-    pieces, skeleton = tree.pieces, tree.skeleton
+    pieces = tree.pieces
     places, is_stem = np.concatenate([pieces.start_point, pieces.end_point]), np.tile(pieces.order == 0, 2)
     if len(tree.near):
-        stem_rows = np.unique(pieces.branch[pieces.order == 0])
-        vertices = np.concatenate([skeleton.branches[row] for row in stem_rows])
-        places = skeleton.points[tree.near]
-        is_stem = np.isin(skeleton.vertex_of_point[tree.near], vertices)
+        places, is_stem = tree.skeleton.points[tree.near], tree.is_on_stem
     crown = places[~is_stem | (tree.heights(places) >= base)] if np.isfinite(base) else places[:0]
     across = np.delete(crown, "xyz".index(tree.up[-1]), axis=1)
     return tree.unit**2 * _hull_size(across), tree.unit**3 * _hull_size(crown)

@@ -1,6 +1,7 @@
 """The stem of a tree: its diameter at any height, and its taper."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -53,6 +54,13 @@ class Stem:
         stem = self.pieces.order == 0
         return float(self.heights(np.concatenate([self.pieces.start_point[stem], self.pieces.end_point[stem]])).max())
 
+    @cached_property
+    def is_on_stem(self) -> np.ndarray:
+        """Which of the points `near` belong to the stem, (n,) bool array."""
+        rows = np.unique(self.pieces.branch[self.pieces.order == 0])
+        vertices = np.concatenate([self.skeleton.branches[row] for row in rows])
+        return np.isin(self.skeleton.vertex_of_point[self.near], vertices)
+
     def diameter_at(self, height: float) -> float:
         """Diameter of the circle through the points of the stem in a slice of 10 cm across it; NaN if unknown.
 
@@ -101,9 +109,7 @@ class Stem:
         around = stem & (unit * norm((pieces.start_point + pieces.end_point) / 2 - place) <= STEM_SPAN)
         around[row] = True
         direction = unit_vectors(step[around].sum(axis=0, keepdims=True))
-        vertices = np.concatenate([skeleton.branches[row] for row in np.unique(pieces.branch[stem])])
-        near = self.near[np.isin(skeleton.vertex_of_point[self.near], vertices)]
-        offset = unit * (skeleton.points[near] - place)
+        offset = unit * (skeleton.points[self.near[self.is_on_stem]] - place)
         offset = offset[np.abs(offset @ direction[0]) <= SLICE / 2]
         fit = fit_circle(offset @ plane_axes(direction)[0])
         if len(skeleton.points) == 0:

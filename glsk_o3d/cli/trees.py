@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from .. import analysis
-from ..errors import BatchError, GlskError, in_words
+from ..errors import BatchError, GlskError, SkeletonWarning, in_words
 from .console import print_rows, print_table, progress, say, value_in_words
 from .options import ReportPage, Root, Where, argument, option, output_option
 from .outputs import PAGE, Output, check_outputs, print_result, write_outputs
@@ -63,9 +64,14 @@ def tree(
         for number, path in enumerate(trees):
             update(path.name, number, len(trees))
             try:
-                skeleton = _skeleton(path, root, up, where)
-                measures = analysis.tree_measures(skeleton, root, up=up, unit=unit)
-                rows.append({"tree": str(path), **measures.sums(), "error": ""})
+                with warnings.catch_warnings():
+                    if len(trees) > 1:  # then they have the name of the tree, and are in its row
+                        warnings.simplefilter("ignore", SkeletonWarning)
+                    skeleton = _skeleton(path, root, up, where)
+                    measures = analysis.tree_measures(skeleton, root, up=up, unit=unit)
+                for doubt in measures.doubts if len(trees) > 1 else ():
+                    say("warning", f"{path}: {doubt}")
+                rows.append({"tree": str(path), "verdict": skeleton.verdict.value, **measures.sums(), "error": ""})
             except (GlskError, OSError) as error:
                 if len(trees) == 1:
                     raise

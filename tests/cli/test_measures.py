@@ -72,6 +72,7 @@ def test_a_table_of_trees_has_a_row_for_each_and_the_errors(invoke, tmp_path, y,
     with (tmp_path / "trees.csv").open(newline="") as stream:
         rows = list(csv.DictReader(stream))
     assert [row["tree"] for row in rows] == [y, "bad.json", "scan.ply"]
+    assert [row["verdict"] for row in rows][::2] == [read_skeleton(tmp_path / y).verdict.value, "good"]
     assert [bool(row["error"]) for row in rows] == [False, True, False]
     skeleton = pipelines.tree()(read_cloud(tmp_path / "scan.ply"))
     measures = tree_measures(skeleton)
