@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from .. import analysis
-from ..errors import BatchError, GlskError, SkeletonWarning, in_words
+from ..errors import BatchError, FileFormatError, GlskError, SkeletonWarning, in_words
 from .console import print_rows, print_table, progress, say, value_in_words
 from .options import ReportPage, Root, Where, argument, option, output_option
 from .outputs import PAGE, Output, check_outputs, print_result, write_outputs
@@ -95,6 +95,8 @@ def _skeleton(path: Path, root: Any, up: str | None, where: str | None) -> Skele
     from ..io.streaming import points_for
 
     if holds_skeleton(path) or not path.is_file():
+        if where is not None and path.is_file():
+            raise FileFormatError(f"{path}: is a skeleton, and --where chooses points of scans")
         return read_skeleton(path)
     pipeline = pipelines.tree(root or up or "z")
     skeleton: Skeleton = pipeline(points_for(pipeline, path, where))

@@ -79,7 +79,8 @@ def test_a_table_of_trees_has_a_row_for_each_and_the_errors(invoke, tmp_path, y,
     for name in ("stem_diameter", "crown_area", "length_with_traced", "volume_without_traced"):
         assert float(rows[2][name]) == pytest.approx(getattr(measures, name))
     assert invoke("tree", y, "scan.ply", "--cylinders", "c.csv").exit_code == 2
-    shown = invoke("tree", "scan.ply", "--report", "tree.html").stdout
+    assert "--where chooses points of scans" in invoke("tree", y, "--where", "x > 0").stderr
+    shown = invoke("tree", "scan.ply", "--where", "z > -9", "--report", "tree.html").stdout
     assert "length without traced" in shown
     page = (tmp_path / "tree.html").read_text("utf-8")
     for label in ("length with traced", "volume without traced", "Taper", "Diameter classes"):
