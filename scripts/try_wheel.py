@@ -36,7 +36,7 @@ skeletonize demo/cloud.ply -o r.json --preview r.png --report r.html
 batch demo/cloud.ply -o many
 skeletonize scan.csv -o tree.ply --where tree==1
 branches s.json -o branches.csv
-tree t.json --unit 1 -o cylinders.csv
+tree t.json --unit 1 --cylinders cylinders.csv
 grasps s.json --opening 0.3 -o grasps.json
 rig s.json -o rig.glb --cut-loops
 convert s.json s.obj

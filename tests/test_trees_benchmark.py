@@ -5,6 +5,7 @@ import json
 import numpy as np
 import open3d as o3d
 import pytest
+import typer
 from glsk_studies import forest, trees
 from scipy.io import savemat
 
@@ -49,7 +50,7 @@ def written(path, names, columns, between=","):
 
 
 class TestModels:
-    @pytest.fixture(params=("TreeQSM text", "TreeQSM matrix", "SimpleForest", "aRchi"))
+    @pytest.fixture(params=("TreeQSM text", "TreeQSM bare", "TreeQSM matrix", "SimpleForest", "aRchi"))
     def model(self, request, tmp_path):
         """The three cylinders as programs write them."""
         path, ends = tmp_path / "model.txt", [f"{end}{axis}" for end in ("start", "end") for axis in "XYZ"]
@@ -57,6 +58,9 @@ class TestModels:
             names = ["radius (m)", "length (m)", "start_point", "axis_direction", "parent", "extension", "branch"]
             columns = [RADIUS, LENGTH, START, AXIS, PARENT, [2, 0, 0], [1, 1, 2], ORDER, [1, 2, 1], [0, 0, 0]]
             return written(path, [*names, "branch_order", "position_in_branch", "added"], columns, "\t")
+        if request.param == "TreeQSM bare":  # fourteen columns, as it wrote until 2.3, and no line of names
+            columns = [RADIUS, LENGTH, START, AXIS, PARENT, [2, 0, 0], [1, 1, 2], ORDER, [1, 2, 1], [0, 0, 0]]
+            return written(path, ["# Cylinder data"], columns, "\t")
         if request.param == "TreeQSM matrix":
             cylinder = dict(radius=RADIUS[:, None], length=LENGTH[:, None], start=START, axis=AXIS, BranchOrder=ORDER)
             savemat(tmp_path / "model.mat", {"QSM": [{"cylinder": cylinder}, {"cylinder": dict(radius=[1.0])}]})
@@ -75,6 +79,19 @@ class TestModels:
         assert found.volume == pytest.approx(np.pi * (0.04 * 2 + 0.0225 * 2 + 0.01 * 2.5))
         assert found.order.tolist() == [0, 0, 1]
         np.testing.assert_allclose(found.end, END)
+
+    def test_a_table_without_names_has_those_that_are_given(self, tmp_path):
+        names = (
+            "ID",
+            *(f"{end}{axis}" for end in ("start", "end") for axis in "XYZ"),
+            "radius",
+            "length",
+            "branchOrder",
+        )
+        path = written(tmp_path / "bare.csv", ["# SimpleForest"], [[0, 1, 2], START, END, RADIUS, LENGTH, ORDER])
+        assert forest.read_cylinder_model(path, names).length == pytest.approx(6.5)
+        with pytest.raises(typer.BadParameter, match="no line of names"):
+            forest.read_cylinder_model(path)
 
 
 class TestCommands:

@@ -1,10 +1,12 @@
 from .assessment import Assessment, assess
 from .branches import BranchTable, branch_table
 from .comparison import Comparison, Truth, compare
+from .crowns import diameter_classes
 from .forestry import TreeMeasures, tree_measures
 from .grasps import grasp_candidates
 from .gripper import GraspCandidates, Gripper
 from .segmentation import segment
+from .stems import Stem, stem
 from .trees import Cylinders, cylinders
 
 __all__ = [
@@ -14,13 +16,16 @@ __all__ = [
     "Cylinders",
     "GraspCandidates",
     "Gripper",
+    "Stem",
     "TreeMeasures",
     "Truth",
     "assess",
     "branch_table",
     "compare",
     "cylinders",
+    "diameter_classes",
     "grasp_candidates",
     "segment",
+    "stem",
     "tree_measures",
 ]

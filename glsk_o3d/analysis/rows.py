@@ -3,7 +3,7 @@
 import csv
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, ClassVar
@@ -51,10 +51,15 @@ class Rows:
 
         The file appears complete or not at all; an OSError says why it does not.
         """
-        rows = [["" if isinstance(v, float) and not math.isfinite(v) else v for v in row.values()] for row in self]
+        write_table(path, self._columns(), [list(row.values()) for row in self])
 
-        def write(temporary: Path) -> None:
-            with temporary.open("w", newline="", encoding="utf-8", errors="replace") as stream:
-                csv.writer(stream, lineterminator="\n").writerows([self._columns(), *rows])
 
-        write_atomically(path, write)
+def write_table(path: str | os.PathLike[str], names: Iterable[str], rows: Iterable[Sequence[Any]]) -> None:
+    """Write CSV, complete or not at all: a line of names, then a line per row. NaN and infinity are left empty."""
+    cells = [["" if isinstance(v, float) and not math.isfinite(v) else v for v in row] for row in rows]
+
+    def write(temporary: Path) -> None:
+        with temporary.open("w", newline="", encoding="utf-8", errors="replace") as stream:
+            csv.writer(stream, lineterminator="\n").writerows([names, *cells])
+
+    write_atomically(path, write)

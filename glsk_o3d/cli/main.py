@@ -19,10 +19,11 @@ from .crosscheck import crosscheck
 from .edit import convert, edit, rig
 from .filters import filters
 from .info import info, view
-from .measures import branches, evaluate, grasps, tree
+from .measures import branches, evaluate, grasps
 from .reporting import FAILURE_CODE, as_command, reporting
 from .run import run
 from .skeletonize import demo, skeletonize
+from .trees import tree
 
 EPILOG = (
     "Exit codes: 0 all went well; 1 the input or the run failed; 2 the command line is wrong; 130 interrupted. "

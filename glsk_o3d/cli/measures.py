@@ -1,4 +1,4 @@
-"""``glsk evaluate``, ``branches``, ``tree`` and ``grasps``: what can be measured of a skeleton."""
+"""``glsk evaluate``, ``branches`` and ``grasps``: what can be measured of a skeleton."""
 
 from __future__ import annotations
 
@@ -97,33 +97,6 @@ def branches(
         print_table(zip(*columns.values(), strict=True), [name.replace("_", " ") for name in columns])
 
     print_result({"skeleton": str(skeleton), "branches": list(table)}, words, write_outputs(outputs, table))
-
-
-def tree(
-    skeleton: Annotated[Path, argument("SKELETON", "Of a tree, with radii: 'glsk skeletonize --pipeline tree'.")],
-    output: Annotated[list[Path] | None, output_option("FILE", "Write cylinders, as csv.")] = None,
-    root: Root = None,
-    up: Annotated[str | None, option("AXIS", "What points up, x to -z; else as it was grown, or z.")] = None,
-    unit: Annotated[float, option("METRES", "One unit of the file, in metres: 0.001 for millimetres.")] = 1,
-) -> None:
-    """Measure a tree: height, stem, length and volume by order.
-
-    Of length and volume there is a number for each order, from that of the stem on. Volume is that of parts with a
-    surface: where there was none, radii are the scatter of the points, and the share is called traced. What is hardly
-    as it should be is said on stderr, and in JSON as doubts.
-    JSON and npz files say where the tree grows from, and keep the points that the stem's diameter is measured on. All
-    is in metres if --unit says what a unit of the file is; only a csv file of cylinders is in the units of the file.
-    """
-    from .. import read_skeleton
-
-    table = "file is a table of cylinders"
-    outputs = [Output(path, (".csv",), table, analysis.Cylinders.to_csv) for path in output or []]
-    check_outputs(outputs, skeleton)
-    curve = read_skeleton(skeleton)
-    measures = analysis.tree_measures(curve, root, up=up, unit=unit)
-    files = write_outputs(outputs, analysis.cylinders(curve, root, up)) if output else {}
-    facts = {"skeleton": str(skeleton), **asdict(measures)}
-    print_result(facts, lambda: print_rows({**facts, "doubts": None}), files)
 
 
 def grasps(

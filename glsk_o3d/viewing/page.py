@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.forestry import TreeMeasures, measures_of_grown
 from ..analysis.summary import ITERATION_COLUMNS, iteration_rows
 from ..curve.detail import with_limbs
 from ..data.decisions import coordinates
@@ -29,6 +30,7 @@ HOVER = (
     "vertex %{customdata[0]} · branch %{customdata[1]} · radius %{customdata[2]:.4g} · confidence %{customdata[3]:.2f}"
     "<extra></extra>"
 )
+WITH_TRACED = "Traced parts have no surface: with them, length is that of paths through points, and volume an estimate."
 
 
 def save_report(
@@ -37,12 +39,15 @@ def save_report(
     *,
     title: str = "Curve skeleton",
     facts: Mapping[str, Mapping[str, str]] | None = None,
+    unit: float = 1.0,
+    up: str | None = None,
 ) -> None:
     """Write a page that shows a skeleton and the run that made it.
 
     The page is one HTML file of 5 MB that works offline in any browser with WebGL: cloud, skeleton and radius tubes to
     turn and zoom by plotly, which comes with Open3D, with a slider for limbs; the run's numbers, warnings, recipe and
-    versions. Of larger clouds 20 000 points are shown, drawn at random.
+    versions; of a tree that was grown from a root, its measures. Of larger clouds 20 000 points are shown, drawn at
+    random.
 
     Parameters
     ----------
@@ -53,6 +58,8 @@ def save_report(
         Shown literally.
     facts : dict of str to dict of str to str, optional
         More sections: a table of names and texts below each heading, such as the numbers of a cross-check.
+    unit, up : float, str, optional
+        One unit of the cloud in metres, and the axis that points up, for the measures of a tree; see `tree_measures`.
 
     Raises
     ------
@@ -66,11 +73,13 @@ def save_report(
     >>> glsk.save_report(glsk.skeletonize(torus(600).points), "report.html", title="A torus")  # doctest: +SKIP
     """
     check_ending(path, "report is a page", ".html", ".htm")
-    page = _page(skeleton.whole, title, facts or {}).encode("utf-8", "replace")  # a file name may be no Unicode
+    page = _page(skeleton.whole, title, facts or {}, measures_of_grown(skeleton, unit, up)).encode(
+        "utf-8", "replace"
+    )  # a file name may be no Unicode
     write_atomically(path, lambda temporary: temporary.write_bytes(page))
 
 
-def _page(skeleton: Skeleton, title: str, facts: Mapping[str, Mapping[str, str]]) -> str:
+def _page(skeleton: Skeleton, title: str, facts: Mapping[str, Mapping[str, str]], measures: TreeMeasures | None) -> str:
     shown = thinned(skeleton.points, MOST_DRAWN_POINTS)
     finite = np.isfinite(skeleton.points).all(axis=1).sum()
     report, kind = skeleton.report, "Curve skeleton" if len(skeleton.vertices) else "Point cloud"
@@ -86,10 +95,10 @@ def _page(skeleton: Skeleton, title: str, facts: Mapping[str, Mapping[str, str]]
             markup("<div><dt>{}</dt><dd>{}</dd></div>", *item)
             for item in {**counts(skeleton), **verdict(skeleton)}.items()
         ],
-        warnings=warnings(report.warnings),
+        warnings=warnings([*report.warnings, *(measures.doubts if measures else ())]),
         view=Markup(_view(skeleton, skeleton.points[shown])),
         thinning=f"The view shows {len(shown):,} of {finite:,} points." if len(shown) < finite else "",
-        sections=[*more, contraction(report), topology(report), support(report), origin(report)],
+        sections=[*more, tree(measures), contraction(report), topology(report), support(report), origin(report)],
     )
 
 
@@ -192,6 +201,23 @@ def warnings(messages: Iterable[str]) -> Markup:
     """The warnings, each once."""
     rows = [markup("<li>{}</li>", text) for text in dict.fromkeys(messages)]
     return markup('<div class="warnings" role="note"><strong>Warnings</strong><ul>{}</ul></div>' if rows else "", rows)
+
+
+def tree(measures: TreeMeasures | None) -> Markup:
+    """The measures of a tree, the taper of its stem, and its wood by diameter; nothing without."""
+    if measures is None:
+        return Markup()
+    sums = [(name, value) for name, value in measures.sums().items() if isinstance(value, float) and name != "unit"]
+    tables = [_table(("measure", "value"), [(name.replace("_", " "), _number(value)) for name, value in sums])]
+    for heading, rows in {"Taper": measures.taper, "Diameter classes": measures.classes}.items():
+        heads = [name.replace("_", " ") for name in (rows[0] if rows else ())]
+        tables.append(_section(heading, _table(heads, [[*map(_number, row.values())] for row in rows])))
+    units = f"In metres, square and cubic metres; the arc is in degrees. One unit of the cloud is {measures.unit:g} m. "
+    return _section("Tree", Markup("".join(tables)), f"{units}{WITH_TRACED}")
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}".replace("nan", "not known")
 
 
 def contraction(report: Report) -> Markup:

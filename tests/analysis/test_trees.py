@@ -10,13 +10,14 @@ from glsk_o3d import (
     Report,
     Skeleton,
     SkeletonWarning,
+    analysis,
     pipelines,
     read_skeleton,
     samples,
     save_skeleton,
 )
-from glsk_o3d.analysis import branch_table, cylinders, tree_measures
-from glsk_o3d.analysis.forestry import fit_circle
+from glsk_o3d.analysis import branch_table, cylinders, diameter_classes, tree_measures
+from glsk_o3d.analysis.circles import fit_circle
 
 quiet = pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
 Z = np.array([0, 0, 1.0])
@@ -133,7 +134,7 @@ def test_cylinders_need_a_tree_with_radii(skeleton, cause):
         cylinders(skeleton)
 
 
-@pytest.mark.filterwarnings("ignore:uncertain topology")  # twigs that outliers join are close calls
+@quiet  # twigs that outliers join are close calls, and most of the length is traced
 def test_outliers_do_not_change_the_measures():
     points = samples.tree(4096, forks=6, seed=0).points
     outliers = np.random.default_rng(0).uniform(points.min(axis=0), points.max(axis=0), (5, 3))
@@ -333,3 +334,74 @@ def test_the_arc_is_where_points_are():
 )
 def test_few_points_and_lines_have_no_circle(points):
     assert fit_circle(points) is None
+
+
+def cone(height, radius, n, rng):
+    """Points on the side of a cone that stands on the ground, even by area, with a curve to its tip as skeleton."""
+    level = height * (1 - np.sqrt(rng.random(n)))
+    turn = 2 * np.pi * rng.random(n)
+    wide = radius * (1 - level / height)
+    points = np.column_stack([wide * np.cos(turn), wide * np.sin(turn), level])
+    axis = np.linspace(0, height, 101)
+    edges = np.column_stack([np.arange(100), np.arange(1, 101)])
+    owner = np.abs(points[:, 2:] - axis).argmin(axis=1)
+    up = np.column_stack([0 * axis, 0 * axis, axis])
+    radii = radius * (1 - axis / height)
+    return Skeleton(up, edges, radii, owner, points, 0 * points, confidence=np.ones(101))
+
+
+@quiet
+def test_taper_volume_and_classes_of_a_cone():
+    """D = 2 r (1 - z / h), V = pi r^2 h / 3, and as much between two diameters as between two heights."""
+    height, radius = 10.0, 0.3
+    skeleton = cone(height, radius, 40000, np.random.default_rng(0))
+    trunk, measures = analysis.stem(skeleton, 0, up="z"), tree_measures(skeleton, 0, up="z")
+    for level in (0.5, 1.3, 4.0, 8.0):
+        assert trunk.diameter_at(level) == pytest.approx(2 * radius * (1 - level / height), rel=0.005)
+    assert np.isnan(trunk.diameter_at(11))
+    heights = [section["height"] for section in measures.taper]
+    np.testing.assert_allclose(heights, 0.5 * np.arange(1, 20))
+    for section in measures.taper[:18]:
+        assert section["diameter"] == pytest.approx(2 * radius * (1 - section["height"] / height), rel=0.01)
+        assert section["cylinder_diameter"] == pytest.approx(section["diameter"], abs=2 * radius * 0.12)
+    volume = np.pi * radius**2 * height / 3
+    assert measures.volume_with_traced == measures.volume_without_traced == pytest.approx(volume, rel=0.02)
+    fine = diameter_classes(cylinders(skeleton, 0), width=0.2)
+    assert [round(each["low"], 9) for each in fine] == [0, 0.2, 0.4]
+    share = np.array([each["volume_with_traced"] for each in fine]) / volume
+    np.testing.assert_allclose(share, np.diff([0, 1 / 27, 8 / 27, 1]), atol=0.12)  # cylinders are four radii long
+    assert sum(each["length_with_traced"] for each in measures.classes) == pytest.approx(measures.length_with_traced)
+
+
+@pytest.mark.parametrize("unit", [1.0, 0.001])
+@quiet
+def test_the_hull_of_a_crown_that_is_a_cone(unit):
+    """Branches in a circle reach down from the top: the hull is a cone, and only the stem is below it."""
+    turn = 2 * np.pi * np.arange(64) / 64
+    ends = np.column_stack([2 * np.cos(turn), 2 * np.sin(turn), 0 * turn + 5])
+    places = np.concatenate([[[0, 0, 0], [0, 0, 8.0], [0, 0, 8.1]], ends]) / unit
+    edges = [(0, 1), (1, 2), *((1, 3 + k) for k in range(64))]
+    skeleton = Skeleton(places, edges, np.full(67, 0.01) / unit, np.arange(67), places, 0 * places)
+    measures = tree_measures(skeleton, 0, up="z", unit=unit)
+    assert measures.crown_base == pytest.approx(8, abs=0.1)
+    area = 32 * 4 * np.sin(2 * np.pi / 64)
+    assert measures.crown_area == pytest.approx(area)
+    assert measures.crown_volume == pytest.approx(area * 3.1 / 3, rel=1e-6)
+
+
+def test_lengths_and_volumes_with_and_without_traced_parts():
+    trunk = stem_shell(0.15, 3.0, 6000, np.random.default_rng(3))
+    upper = replace(trunk, confidence=(np.arange(31) < 16).astype(float))
+    measures, table = tree_measures(upper, 0, up="z"), cylinders(upper, 0)
+    assert measures.length_with_traced == pytest.approx(table.length.sum())
+    assert measures.volume_with_traced == pytest.approx(table.volume.sum())
+    assert measures.length_without_traced == pytest.approx(0.6 * measures.length_with_traced)
+    assert measures.volume_without_traced == pytest.approx(sum(measures.volume))
+    assert {"stem_diameter", "crown_area", "volume_with_traced", "doubts"} <= measures.sums().keys()
+    assert np.isnan(tree_measures(replace(trunk, confidence=np.full(31, np.nan)), 0, up="z").length_without_traced)
+
+
+def test_a_tree_that_is_mostly_traced_needs_leaf_off():
+    trunk = stem_shell(0.15, 3.0, 6000, np.random.default_rng(3))
+    with pytest.warns(SkeletonWarning, match="60 % of the length has no surface.* needs leaf-off"):
+        tree_measures(replace(trunk, confidence=(np.arange(31) < 10).astype(float)), 0, up="z")

@@ -16,6 +16,7 @@ MATRIX_STRUCTS = ("OptQSM", "QSM")  # of TreeQSM's .mat, each with a struct call
 # published: the columns of TreeQSM's text, which has one name for each three of them (TreeQSM's manual)
 TEXT_COLUMNS = ("radius", "length", "start.x", "start.y", "start.z", "axis.x", "axis.y", "axis.z")
 TEXT_COLUMNS += ("parent", "extension", "branch", "BranchOrder", "PositionInBranch")
+UNIT_ERROR = 0.01  # precision: of the length of an axis; tables have three digits or more
 STARTS, ENDS = ("startX", "startY", "startZ"), ("endX", "endY", "endZ")
 PROGRAMS = {
     "TreeQSM": (("start.x", "start.y", "start.z"), ("axis.x", "axis.y", "axis.z"), "radius", "BranchOrder", 0),
@@ -42,6 +43,11 @@ class CylinderModel:
         return float(np.pi * (self.radius**2 * norm(self.end - self.start)).sum())
 
     @property
+    def length(self) -> float:
+        """Of all cylinders."""
+        return float(norm(self.end - self.start).sum())
+
+    @property
     def height(self) -> float:
         """Of the highest end above the lowest."""
         return float(np.ptp([self.start[:, 2], self.end[:, 2]]))
@@ -55,12 +61,13 @@ class CylinderModel:
         return float(2 * self.radius[at_level].mean()) if at_level.any() else float("nan")
 
 
-def read_cylinder_model(path: Path) -> CylinderModel:
+def read_cylinder_model(path: Path, names: tuple[str, ...] = ()) -> CylinderModel:
     """The cylinders of a ``.mat`` of TreeQSM, or of text with the columns of one of `PROGRAMS`.
 
-    A ``.mat`` has the struct ``cylinder``, by itself or in `MATRIX_STRUCTS`; of several models the first counts.
+    A ``.mat`` has the struct ``cylinder``, by itself or in `MATRIX_STRUCTS`; of several models the first counts. Text
+    without a line of names has the columns `names`, by default those that TreeQSM writes.
     """
-    columns = matrix_columns(path) if path.suffix == ".mat" else text_columns(path)
+    columns = matrix_columns(path) if path.suffix == ".mat" else text_columns(path, names)
     for starts, ends, radius, order, stem in PROGRAMS.values():
         if {*starts, *ends, radius, order, "length"} <= columns.keys():
             start, end = (np.stack([columns[name] for name in names], axis=1) for names in (starts, ends))
@@ -69,19 +76,44 @@ def read_cylinder_model(path: Path) -> CylinderModel:
     raise typer.BadParameter(f"{path}: no columns of {', '.join(PROGRAMS)}; there are {', '.join(columns)}")
 
 
-def text_columns(path: Path) -> Columns:
-    """Columns by their names; commas, semicolons, tabs or spaces are between them."""
-    first, *rest = path.read_text(encoding="utf-8-sig").replace('"', "").splitlines() or [""]
+def text_columns(path: Path, given: tuple[str, ...] = ()) -> Columns:
+    """Columns by their names; commas, semicolons, tabs or spaces are between them, and `#` begins a comment."""
+    lines = path.read_text(encoding="utf-8-sig").replace('"', "").splitlines()
+    first, *rest = [line for line in lines if line.strip() and not line.lstrip().startswith("#")] or [""]
     between = next((mark for mark in (",", ";", "\t") if mark in first), None)
     names = [name.strip() for name in first.split(between)]
+    is_headed = not all(map(is_number, names))
     try:
-        rows = np.genfromtxt(rest, delimiter=between, ndmin=2)
-        if "start_point" in names:
+        rows = np.genfromtxt(rest if is_headed else [first, *rest], delimiter=between, ndmin=2)
+        if not is_headed:
+            names = list(given or TEXT_COLUMNS)
+            if not given and not is_text_of_treeqsm(rows):
+                raise ValueError("it has no line of names, and is none of TreeQSM: give --columns, such as startX,...")
+            rows = rows[:, : len(names)]
+        elif "start_point" in names:
             names, rows = list(TEXT_COLUMNS), rows[:, : len(TEXT_COLUMNS)]
         # R writes the numbers of rows, and no name above them
         return dict(zip(names, rows.T[rows.shape[1] - len(names) :], strict=True))
     except ValueError as error:
         raise typer.BadParameter(f"{path}: no table with a name above each column: {error}") from None
+
+
+def is_number(word: str) -> bool:
+    """Whether a word of a table is a number."""
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def is_text_of_treeqsm(rows: np.ndarray) -> bool:
+    """Whether rows have the columns of TreeQSM: the axes have unit length, and each order is a whole number."""
+    axis, order = (TEXT_COLUMNS.index(name) for name in ("axis.x", "BranchOrder"))
+    if rows.shape[1] < len(TEXT_COLUMNS):
+        return False
+    is_unit = np.abs(norm(rows[:, axis : axis + 3]) - 1) < UNIT_ERROR
+    return bool(is_unit.all() and (rows[:, order] == rows[:, order].astype(int)).all())
 
 
 def matrix_columns(path: Path) -> Columns:

@@ -36,6 +36,14 @@ STEP = 0.002  # between the places at which curves are measured, as a share of t
 CLOSE = 0.01  # places nearer to the other curve are right, as a share of the diagonal
 TREE_MEASURES = ("volume", "stem_diameter", "height", "radius")
 NOISE = 0.001  # share of the diagonal, 7 mm
+MODEL_MEASURES = {
+    "height": ("height", "height m"),
+    "stem_diameter": ("stem_diameter", "stem m"),
+    "length": ("length_with_traced", "length m"),
+    "volume": ("volume_with_traced", "volume m3"),
+}
+"""What cylinder models and we measure: our name for it, and the head of the column."""
+WITHOUT_TRACED = ("length", "volume")
 PIPELINES = {"default, untraced": ("default", {"Tracer.surface": 0}), "default": ("default", {}), "tree": ("tree", {})}
 
 
@@ -285,23 +293,28 @@ def diameter_at(tree: samples.Sample, height: float) -> float:
     return float(np.interp(height, tree.nodes[:7, 2], 2 * tree.radii[:7]))
 
 
-def measure_model(cloud: Path, model: Path, unit: float) -> dict:
+def measure_model(cloud: Path, model: Path, unit: float, names: tuple[str, ...] = ()) -> dict:
     """What we and a cylinder model say of a scanned tree."""
-    found, theirs = tree_measures(pipelines.tree()(read_cloud(cloud)), unit=unit), read_cylinder_model(model)
-    mine = dict(height=found.height, stem_diameter=found.stem_diameter, volume=float(sum(found.volume)))
-    said = {name: (value, getattr(theirs, name)) for name, value in mine.items()}
-    return said | dict(doubts=found.doubts)
+    found, theirs = tree_measures(pipelines.tree()(read_cloud(cloud)), unit=unit), read_cylinder_model(model, names)
+    said = {name: (getattr(found, ours), getattr(theirs, name)) for name, (ours, _) in MODEL_MEASURES.items()}
+    without = dict(length_without=found.length_without_traced, volume_without=found.volume_without_traced)
+    return said | without | dict(doubts=found.doubts)
 
 
 def model_tables(rows: list[dict]) -> Tables:
-    """A line for each tree: ours and theirs."""
+    """A line for each tree: ours, of some without traced parts too, and theirs."""
     lines = []
     for row in rows:
-        pairs = [row.get(name, ("-", "-")) for name in ("height", "stem_diameter", "volume")]
-        cells = [it if isinstance(it, str) else f"{it:.3g}" for pair in pairs for it in pair]
+        values = []
+        for name in MODEL_MEASURES:
+            ours, theirs = row.get(name, ("-", "-"))
+            values += [ours, *([row.get(f"{name}_without", "-")] if name in WITHOUT_TRACED else []), theirs]
+        cells = [it if isinstance(it, str) else f"{it:.3g}" for it in values]
         lines.append([row["tree"], *cells, row.get("failure") or "; ".join(row["doubts"])])
-    header = ["", "height m", "theirs", "stem m", "theirs", "volume m3", "theirs", "note"]
-    return [("Scanned trees, and cylinder models of them", header, lines)]
+    header = [""]
+    for name, (_, label) in MODEL_MEASURES.items():
+        header += [label, *(["without traced"] if name in WITHOUT_TRACED else []), "theirs"]
+    return [("Scanned trees, and cylinder models of them", [*header, "note"], lines)]
 
 
 def stem_tables(rows: list[dict]) -> Tables:

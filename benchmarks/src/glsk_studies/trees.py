@@ -68,15 +68,23 @@ def stems(trees: Trees = 36, jobs: Jobs = 2, output: Output = None, page: Page =
 def models(
     paths: Annotated[list[Path], typer.Argument(metavar="CLOUD MODEL...", exists=True, dir_okay=False)],
     unit: Annotated[float, typer.Option("--unit", help="Of the clouds, in metres, as models are.")] = 1,
+    columns: Annotated[
+        str, typer.Option("--columns", metavar="NAMES", help="Of tables without names, with commas; else TreeQSM's.")
+    ] = "",
     output: Output = None,
 ) -> None:
     """Scanned trees beside the cylinder models that TreeQSM, SimpleForest or aRchi made of them: pairs of files.
 
-    A model is a .mat of TreeQSM or a table of any of the three; z points up.
+    A model is a .mat of TreeQSM or a table of any of the three, as downloaded, also without a line of names; z points
+    up. Length and volume are with traced parts, as in models, and without.
     """
     if len(paths) % 2:
         raise typer.BadParameter("give pairs: each cloud, and then its model")
-    work = [(dict(tree=cloud.stem), (cloud, model, unit)) for cloud, model in zip(paths[::2], paths[1::2], strict=True)]
+    names = tuple(columns.split(",")) if columns else ()
+    work = [
+        (dict(tree=cloud.stem), (cloud, model, unit, names))
+        for cloud, model in zip(paths[::2], paths[1::2], strict=True)
+    ]
     publish(run(forest.measure_model, work, 1), forest.model_tables, output)
 
 

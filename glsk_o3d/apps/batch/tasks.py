@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ... import __version__
+from ...analysis.forestry import measures_of_grown
 from ...analysis.summary import summary
 from ...data.report import Report
 from ...data.skeleton import Skeleton
@@ -80,8 +81,9 @@ def _skeletonize(task: Task, row: Row, messages: list[str]) -> None:
         pipeline = from_recipe(task.recipe)
         skeleton = pipeline(points_for(pipeline, task.path, task.where))
     messages += skeleton.report.warnings
-    facts = summary(skeleton, 0.0).items()
-    row |= {name: None if isinstance(value, float) and not math.isfinite(value) else value for name, value in facts}
+    tree = measures_of_grown(skeleton)
+    facts = ({} if tree is None else tree.sums()) | summary(skeleton, 0.0)  # traced is a number of points
+    row |= {k: None if isinstance(value, float) and not math.isfinite(value) else value for k, value in facts.items()}
     if task.accept and not task.is_tile and not skeleton.verdict.is_at_least(task.accept):
         why = "; ".join(reason.text for reason in skeleton.reasons)
         raise InvalidCloudError(f"the skeleton is not accepted: {skeleton.verdict.value}: {why}")

@@ -19,6 +19,7 @@ from ...geometry.vectors import dot, norm, unit
 from ..curve import Curve
 from ..merging import merge_into
 from ..rooted import RootPlace, numbered_from, root_among
+from .continuation import continuations
 from .detect import THIN, SpacedPoints, mostly_on_loops, without_detached_clumps, without_surface
 
 
@@ -55,9 +56,11 @@ def trace(curve: Curve, surface: float, root: RootPlace | None) -> Curve:
         thin = without_surface(cloud, surface)
     if m == 0 or (root is None and (not thin.any() or mostly_on_loops(curve, thin))):
         return curve
-    mixed, joined = _Mixed.of(curve, cloud, thin).joined(anywhere=root is not None)
-    ends = curve.leaves[~thin[curve.leaves]]
-    roots = mixed.roots() if root is None else np.array([root_among(mixed.places, curve, root, ends)])
+    mixed, ends = _Mixed.of(curve, cloud, thin), curve.leaves[~thin[curve.leaves]]
+    roots = None if root is None else np.array([root_among(mixed.places, curve, root, ends)])
+    mixed, continued = mixed.continued(cloud.points, roots)
+    mixed, joined = mixed.joined(anywhere=root is not None)
+    joined, roots = np.concatenate([continued, joined]), mixed.roots() if roots is None else roots
     paths = _Paths(mixed, roots)
     traced = _assembled(curve, mixed, paths, tree=root is not None)
     if thin.any():
@@ -113,6 +116,14 @@ class _Mixed:
         places = np.concatenate([cloud.points[thin_rows], curve.vertices[thick]])
         radius = np.concatenate([np.zeros(n), curve.radii[thick]])
         return cls(n, places, linked(places, ends), edges, thick, radius, scale)
+
+    def continued(self, points: np.ndarray, roots: np.ndarray | None) -> tuple[_Mixed, np.ndarray]:
+        """The trunk of one tree joined across gaps, if it has a root; and the new links."""
+        if roots is None:
+            return self, np.empty((0, 2), int)
+        added = continuations(self.places, self.edges, self.radius, points, int(roots[0]))
+        ends = np.concatenate([np.stack(self.links.nonzero(), axis=1), added])
+        return replace(self, links=linked(self.places, ends) if len(added) else self.links), added
 
     def joined(self, anywhere: bool) -> tuple[_Mixed, np.ndarray]:
         """Its pieces joined, anywhere or only where at least one is without a surface and near; and the new links."""

@@ -10,6 +10,7 @@ import pytest
 
 import glsk_o3d
 from glsk_o3d import Connector, InvalidParameterError, RecipeError, pipelines, read_skeleton, samples, skeletonize
+from glsk_o3d.analysis import tree_measures
 from glsk_o3d.apps.batch import plan_batch, run_batch
 from glsk_o3d.apps.batch.ledger import file_hash
 from glsk_o3d.recipes import to_recipe
@@ -44,6 +45,19 @@ def test_every_scan_is_done_once_and_a_second_run_skips(run, scans, rows, tmp_pa
     assert rows() == ledger == run.result.rows
     assert before == {path: path.stat().st_mtime_ns for path in before}
     assert run(force=True) == dict.fromkeys("abc", "asked for")
+
+
+def test_trees_have_their_measures_in_the_ledger(run, rows, tmp_path):
+    (tmp_path / "in").mkdir()
+    drawn = glsk_o3d.samples.tree(4000, forks=2, length=3, radius=0.2, seed=1)
+    np.savetxt(tmp_path / "in" / "tree.xyz", drawn.points)
+    run(pipeline="tree", formats=["json"])
+    row, measures = rows()["tree"], tree_measures(read_skeleton(tmp_path / "out" / "tree.json"))
+    assert (row["status"], row["traced"], row["unit"]) == ("done", 0, 1)
+    assert row["stem_diameter"] == pytest.approx(measures.stem_diameter)
+    assert row["length_without_traced"] == pytest.approx(measures.length_without_traced)
+    run(force=True)
+    assert "stem_diameter" not in rows()["tree"]
 
 
 def test_a_second_run_does_what_has_changed(run, scans, rows, write, tmp_path):

@@ -1,0 +1,58 @@
+"""The crown of a tree, and its wood by diameter."""
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from .stems import Stem
+from .trees import Cylinders
+
+CLASS_WIDTH = 0.05  # published: metres; foresters' classes of diameters
+
+
+def diameter_classes(pieces: Cylinders, unit: float = 1.0, width: float = CLASS_WIDTH) -> tuple[dict[str, float], ...]:
+    """Length and volume of cylinders by diameter, in metres: a dict for each class that is not empty.
+
+    Its names are ``low`` and ``high``, and those of the sums of `TreeMeasures`. A diameter between two classes is in
+    the upper one. `unit` and `width` are one unit of the cloud, and the width of a class, in metres.
+
+    Examples
+    --------
+    >>> from glsk_o3d import pipelines
+    >>> from glsk_o3d.analysis import cylinders
+    >>> from glsk_o3d.samples import tube
+    >>> log = cylinders(pipelines.tree("x")(tube(2000, length=2, radius=0.11).points))
+    >>> [round(each["low"], 2) for each in diameter_classes(log)]
+    [0.2]
+    """
+    number = np.floor(2 * unit * pieces.radius / width).astype(int)
+    seen, length, volume = pieces.confidence != 0, unit * pieces.length, unit**3 * pieces.volume
+    classes = []
+    for row in np.unique(number).tolist():
+        sums = {"low": row * width, "high": (row + 1) * width}
+        for name, sizes in (("length", length), ("volume", volume)):
+            sums[f"{name}_with_traced"] = float(sizes[number == row].sum())
+            sums[f"{name}_without_traced"] = float(sizes[(number == row) & seen].sum())
+        classes.append(sums)
+    return tuple(classes)
+
+
+def crown_hulls(tree: Stem, base: float) -> tuple[float, float]:
+    """Area of the convex hull of a crown seen from above, and volume of that in space, in metres; NaN without one.
+
+    The crown is what belongs to branches, and the stem above the crown base, by points or else by cylinders.
+    """
+    pieces = tree.pieces
+    places, is_stem = np.concatenate([pieces.start_point, pieces.end_point]), np.tile(pieces.order == 0, 2)
+    if len(tree.near):
+        places, is_stem = tree.skeleton.points[tree.near], tree.is_on_stem
+    crown = places[~is_stem | (tree.heights(places) >= base)] if np.isfinite(base) else places[:0]
+    across = np.delete(crown, "xyz".index(tree.up[-1]), axis=1)
+    return tree.unit**2 * _hull_size(across), tree.unit**3 * _hull_size(crown)
+
+
+def _hull_size(points: np.ndarray) -> float:
+    """Area of the convex hull of points (n, 2), or volume of that of (n, 3); NaN without one."""
+    try:
+        return float(ConvexHull(points).volume)
+    except (QhullError, ValueError):  # too few, or flat
+        return float("nan")
