@@ -11,7 +11,6 @@ from scipy.spatial import cKDTree
 import glsk_o3d as glsk
 from glsk_o3d import pipelines, samples
 from glsk_o3d.analysis import Gripper, grasp_candidates, segment
-from glsk_o3d.analysis.segmentation import branch_of_edge
 from glsk_o3d.io.colors import shades
 
 INK, RED, GREY, BLUE = "#333333", "#d0121f", "#b4b4b4", "#1f5fa8"
@@ -113,7 +112,7 @@ def portrait(axes, skeleton, points, box, colors=None, width=2.5, beside=(), **a
     greys = np.linspace(0.88, 0.55, len(order))  # the far ones lighter
     shown = dict(c=greys, cmap="gray", vmin=0, vmax=1) if colors is None else dict(c=colors[order])
     axes.scatter(*cloud[order, :2].T, s=1.8, linewidths=0, clip_on=False, **shown)
-    branches = shades(skeleton, "branch", branch_of_edge(skeleton), skeleton.edges)
+    branches = shades(skeleton, "branch", skeleton.branch_of_edge, skeleton.edges)
     for edge in np.argsort(vertices[skeleton.edges, 2].mean(axis=1)):  # what is in front crosses what is behind
         across, up = vertices[skeleton.edges[edge], :2].T
         axes.plot(across, up, color="white", linewidth=width + 1.7, solid_capstyle="butt")

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from glsk_o3d import InvalidCloudError, Skeleton
-from glsk_o3d.analysis.segmentation import branch_of_edge, branch_of_vertex
+from glsk_o3d.analysis.segmentation import branch_of_vertex
 from glsk_o3d.io.colors import UNKNOWN_GREY, shades
 
 Make = Callable[..., Any]
@@ -122,7 +122,7 @@ def markers_of(skeleton: Skeleton, header: Any, make: Make) -> Any:
     known = skeleton.radii[skeleton.radii > 0]
     width = THINNER * float(np.median(known)) if len(known) else 0.01
     ends = skeleton.vertices[skeleton.edges].reshape(-1, 3)
-    lines = shades(skeleton, "branch", branch_of_edge(skeleton), skeleton.edges).repeat(2, axis=0)
+    lines = shades(skeleton, "branch", skeleton.branch_of_edge, skeleton.edges).repeat(2, axis=0)
     plain = np.flatnonzero(skeleton.degree < 3)
     balls = shades(skeleton, "branch", branch_of_vertex(skeleton)[plain], plain)
     forks = skeleton.vertices[skeleton.junctions]
