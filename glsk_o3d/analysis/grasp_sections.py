@@ -15,7 +15,7 @@ SEEN_SIDE = 0.5  # fitted: a side that the points show less of, over the other s
 FACING = 0.85  # fitted: cosine of the angle between a jaw and the surface that it touches, where that was seen
 ALIKE = 0.9  # fitted: distances of two sides of a part from its axis, the less over the greater
 CONTACT_DEPTH = 0.1  # fitted: of the points that a jaw touches, over the width of the part
-FARTHEST = 1.0  # fitted: vertices whose points show a section, over the radius or the width of a finger
+SECTION_REACH = 1.0  # fitted: vertices whose points show a section, over the radius or the width of a finger
 FEWEST = 8  # fitted: points that show a section
 
 
@@ -61,7 +61,7 @@ def sections_at(
     )
     for place, number in enumerate(branch.tolist()):
         path = skeleton.branches[number]
-        local = path[norm(skeleton.vertices[path] - position[place]) <= FARTHEST * np.fmax(half[place], across)]
+        local = path[norm(skeleton.vertices[path] - position[place]) <= SECTION_REACH * np.fmax(half[place], across)]
         rows = points_of[np.unique(local)].indices
         offset = whole.points[rows] - position[place]
         near = abs(offset @ axis[place]) < across / 2

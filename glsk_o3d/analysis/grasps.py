@@ -3,7 +3,9 @@
 import time
 import warnings
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,8 +30,8 @@ from .gripper import GraspCandidates, Gripper, in_words
 PLACES_AT_ONCE = 32  # speed: after how many places the clock is read
 WALL_POINTS = 16  # fitted: neighbours among outliers that show whether they form a wall
 WALL_FLATNESS = 0.01  # fitted: third over first principal spread of outliers that form a wall
-FINER = 2  # fitted: directions per approach direction, one of which is across the thin side of a flat part
-FLAT = 0.9  # fitted: width across the thin side of a flat part, over that in the usual directions
+TURNS_PER_STEP = 2  # fitted: directions per approach direction, one of which is across the thin side of a flat part
+FLAT_PART = 0.9  # fitted: width across the thin side of a flat part, over that in the usual directions
 UNLIKELY_OPENING = 20.0  # derived: openings over diagonals: above those of hands and screws, below those of mm and m
 
 
@@ -121,41 +123,26 @@ def grasp_candidates(
     >>> axis = Skeleton(straight.nodes, straight.edges, straight.radii, (), (), (), confidence=[1, 1])
     >>> table = (0, 0, 1, 0.1)  # z = -0.1: the tube lies on it, and cannot be taken from below, nor from the side
     >>> grasp_candidates(axis, 0.4, cloud=straight.points, plane=table, clearance=0.05, around=4)
-    GraspCandidates(9 at 9 places; not taken: 27 ways in behind the plane)
+    GraspCandidates(10 at 10 places; not taken: 30 ways in behind the plane)
     """
     gripper = gripper if isinstance(gripper, Gripper) else Gripper(gripper)
     clearance = gripper.max_opening / 10 if clearance is None else clearance
     _check(skeleton, clearance, around, spacing, min_confidence, accept, max_places, seconds, outlier_factor)
+    stop = np.inf if seconds is None else time.monotonic() + seconds
     plane = None if plane is None else checked_plane(plane)
     points, middle = _obstacles(skeleton, cloud, mask, outlier_factor)
-    if gripper.max_opening > UNLIKELY_OPENING * np.linalg.norm(np.ptp(middle, axis=0)):
-        many = f"more than {UNLIKELY_OPENING:g} times as wide as the object is long"
-        warnings.warn(f"the gripper opens {many}: are the units the same?", SkeletonWarning, stacklevel=outside())
-    accepted = skeleton.verdict.is_at_least(Verdict(accept))
-    if not accepted:
-        reason = "; ".join(it.text for it in skeleton.report.reasons if CODES[it.code] == skeleton.verdict)
-        advice = f"accept={skeleton.verdict.value!r} takes it all the same"
-        warnings.warn(f"{skeleton.verdict.value} ({reason}): {advice}", SkeletonWarning, stacklevel=outside())
-        skeleton = replace(skeleton, edges=np.empty((0, 2), int))
-    start = time.monotonic()
+    _check_units(gripper, middle)
+    accepted = _is_accepted(skeleton, accept)
+    skeleton = skeleton if accepted else replace(skeleton, edges=np.empty((0, 2), int))
     place, branch, approaches, left_out, examined = _graspable_places(
         skeleton, gripper, clearance, around, spacing, min_confidence
     )
-    sections, shape = approaches.sections, approaches.approach.shape[:2]
+    sections = approaches.sections
     confidence = np.nan_to_num(place[:, 8], nan=1.0)[:, None]
     quality = confidence * np.clip(1 - sections.width / gripper.max_opening, 0, None) * sections.contact
-    opening, depth, seen = np.full(shape, np.nan), np.zeros(shape), np.zeros(shape, int)
-    blocked: Counter[str] = Counter()
-    ranked = np.argsort(-quality.max(axis=1, initial=0).round(9), kind="stable")
-    unsearched = len(ranked)
-    for first in range(0, min(max_places or unsearched, len(ranked)), PLACES_AT_ONCE):
-        if first and seconds is not None and time.monotonic() - start > seconds:
-            break
-        rows = ranked[first : min(first + PLACES_AT_ONCE, max_places or len(ranked))]
-        obstacles, *numbers = check_approaches(approaches.of(rows), points, plane, middle, gripper, clearance)
-        opening[rows], depth[rows], seen[rows] = numbers
-        blocked.update(_remaining(obstacles)[1])
-        unsearched -= len(rows)
+    ranked = np.argsort(-quality.max(axis=1, initial=0).round(9), kind="stable")[:max_places]
+    search = partial(check_approaches, points=points, plane=plane, middle=middle, gripper=gripper, clearance=clearance)
+    opening, depth, seen, blocked, unsearched = _searched(search, approaches, ranked, stop)
     if unsearched:
         left_out["places beyond the budget"] = unsearched
     free = np.flatnonzero(np.isfinite(opening))
@@ -188,6 +175,45 @@ def grasp_candidates(
     return candidates
 
 
+def _searched(
+    search: Callable[[Approaches], Any], approaches: Approaches, ranked: np.ndarray, stop: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict[str, int], int]:
+    """Opening, depth and number of seen sides of approaches, by a search of places in their rank until a time.
+
+    The opening is NaN of those that are not free. The obstacles are counted, and so are the places not searched.
+    """
+    shape = approaches.approach.shape[:2]
+    opening, depth, seen = np.full(shape, np.nan), np.zeros(shape), np.zeros(shape, int)
+    blocked: Counter[str] = Counter()
+    unsearched = shape[0]
+    for first in range(0, len(ranked), PLACES_AT_ONCE):
+        if first and time.monotonic() > stop:
+            break
+        rows = ranked[first : first + PLACES_AT_ONCE]
+        obstacles, opening[rows], depth[rows], seen[rows] = search(approaches.of(rows))
+        blocked.update(_remaining(obstacles)[1])
+        unsearched -= len(rows)
+    return opening, depth, seen, blocked, unsearched
+
+
+def _check_units(gripper: Gripper, middle: np.ndarray) -> None:
+    """Warn if a gripper is so large for the points of the object that it may be in other units."""
+    if gripper.max_opening > UNLIKELY_OPENING * np.linalg.norm(np.ptp(middle, axis=0)):
+        many = f"more than {UNLIKELY_OPENING:g} times as wide as the object is long"
+        warnings.warn(f"the gripper opens {many}: are the units the same?", SkeletonWarning, stacklevel=outside())
+
+
+def _is_accepted(skeleton: Skeleton, accept: Verdict | str) -> bool:
+    """Whether the verdict is at least as good; if not, a warning says why."""
+    verdict = skeleton.verdict
+    if verdict.is_at_least(Verdict(accept)):
+        return True
+    reason = "; ".join(it.text for it in skeleton.report.reasons if CODES[it.code] == verdict)
+    advice = f"accept={verdict.value!r} takes it all the same"
+    warnings.warn(f"{verdict.value} ({reason}): {advice}", SkeletonWarning, stacklevel=outside())
+    return False
+
+
 def _graspable_places(
     skeleton: Skeleton,
     gripper: Gripper,
@@ -203,7 +229,7 @@ def _graspable_places(
     places = [_places_on(skeleton, path, spacing, gripper.finger[1]) for path in skeleton.branches]
     counts = np.array(list(map(len, places)), int)
     place, branch = np.concatenate([np.empty((0, 9)), *places]), np.repeat(np.arange(len(places)), counts)
-    finer = FINER if around > 1 else 1
+    finer = TURNS_PER_STEP if around > 1 else 1
     approach = _directions_around(place[:, 3:6], finer * around)
     closing = np.cross(place[:, None, 3:6], approach)
     sections = sections_at(skeleton, branch, place, (approach, closing), gripper)
@@ -231,7 +257,7 @@ def _turn_across(width: np.ndarray, around: int) -> np.ndarray:
     turns = np.arange(-(finer // 2) + 1, finer // 2 + 1)
     columns = (finer * np.arange(around) + turns[:, None]) % (finer * around)
     narrowest = width[:, columns].min(axis=2)  # (P, turns)
-    narrow = narrowest.min(axis=1) < FLAT * narrowest[:, turns == 0][:, 0]
+    narrow = narrowest.min(axis=1) < FLAT_PART * narrowest[:, turns == 0][:, 0]
     return np.where(narrow, turns[narrowest.argmin(axis=1)], 0)
 
 
