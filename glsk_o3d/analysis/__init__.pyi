@@ -4,6 +4,7 @@ from .comparison import Comparison, Truth, compare
 from .forestry import TreeMeasures, tree_measures
 from .grasps import grasp_candidates
 from .gripper import GraspCandidates, Gripper
+from .scenes import SceneObject, scene_objects
 from .segmentation import segment
 from .trees import Cylinders, cylinders
 
@@ -14,6 +15,7 @@ __all__ = [
     "Cylinders",
     "GraspCandidates",
     "Gripper",
+    "SceneObject",
     "TreeMeasures",
     "Truth",
     "assess",
@@ -21,6 +23,7 @@ __all__ = [
     "compare",
     "cylinders",
     "grasp_candidates",
+    "scene_objects",
     "segment",
     "tree_measures",
 ]
