@@ -69,7 +69,7 @@ NAMES = {
     "analysis": {
         "Branches": ("branch_table", "BranchTable", "segment"),
         "Trees": ("tree_measures", "TreeMeasures", "stem", "Stem", "cylinders", "Cylinders", "diameter_classes"),
-        "Grasps": ("grasp_candidates", "GraspCandidates", "Gripper"),
+        "Grasps": ("scene_objects", "SceneObject", "grasp_candidates", "GraspCandidates", "Gripper"),
         "Measures without a truth": ("assess", "Assessment"),
         "Measures against a known axis": ("compare", "Comparison", "Truth"),
     },

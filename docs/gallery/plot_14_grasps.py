@@ -84,7 +84,9 @@ print(skeleton, *skeleton.report.warnings, sep="\n")
 # the table, which is solid behind its plane. The whole volume that fingers and palm sweep on their way in must be free.
 
 gripper = Gripper(max_opening=0.08)
-options = dict(around=12, spacing=0.006, clearance=0.006)
+options = dict(
+    around=12, spacing=0.006, clearance=0.006, accept="no curve skeleton"
+)  # for its handle
 blind = grasp_candidates(skeleton, gripper, cloud=(), **options)
 safe = grasp_candidates(skeleton, gripper, plane=plane, **options)
 print(f"{len(blind)} by the skeleton alone, {len(safe)} that touch nothing else")

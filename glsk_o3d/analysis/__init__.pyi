@@ -5,6 +5,7 @@ from .crowns import diameter_classes
 from .forestry import TreeMeasures, tree_measures
 from .grasps import grasp_candidates
 from .gripper import GraspCandidates, Gripper
+from .scenes import SceneObject, scene_objects
 from .segmentation import segment
 from .stems import Stem, stem
 from .trees import Cylinders, cylinders
@@ -16,6 +17,7 @@ __all__ = [
     "Cylinders",
     "GraspCandidates",
     "Gripper",
+    "SceneObject",
     "Stem",
     "TreeMeasures",
     "Truth",
@@ -25,6 +27,7 @@ __all__ = [
     "cylinders",
     "diameter_classes",
     "grasp_candidates",
+    "scene_objects",
     "segment",
     "stem",
     "tree_measures",

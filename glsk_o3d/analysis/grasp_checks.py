@@ -1,5 +1,7 @@
 """Obstacles of a gripper on a straight approach: points, and what lies behind a plane."""
 
+from __future__ import annotations
+
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -7,22 +9,30 @@ from scipy.spatial import cKDTree
 
 from ..errors import InvalidParameterError
 from ..geometry.vectors import norm
+from .grasp_sections import Sections
 from .gripper import Gripper
 
 CELL_NEIGHBOURS = 8  # measured: of 1230 approaches through sparse walls 11 seemed free with 4, 1 with 6, none with 8
 # derived: eight neighbours within half a finger's thickness leave a hole as wide as a finger with probability e^-10
 CLOSE_POINTS = 0.5
 CLEARANCES = (1, 2, 3)  # measured: how many to try; in noise of 0.5 % of the diagonal the first alone leaves few grasps
+LEAST_CONTACT = 0.7  # fitted: cosine of the angle between jaws and surface; of steeper ones few hold
 SIDE_BEGINS = np.sqrt(3) / 2  # derived: where a side begins, over the radius: the cosine of 30 degrees
 
 
 class Approaches(NamedTuple):
     """Straight approaches to P places, A to each of them."""
 
-    position: np.ndarray  # (P, 3)
+    position: np.ndarray  # (P, 3), on the axis
     axis: np.ndarray  # (P, 3), of the part
     approach: np.ndarray  # (P, A, 3), perpendicular to the axis
     closing: np.ndarray  # (P, A, 3), from jaw to jaw
+    sections: Sections  # (P, A) arrays: the part between the jaws
+
+    def of(self, places: Any) -> Approaches:
+        """Those to some of the places."""
+        vectors = (self.position[places], self.axis[places], self.approach[places], self.closing[places])
+        return Approaches(*vectors, self.sections.of(places))
 
 
 def check_approaches(
@@ -31,31 +41,35 @@ def check_approaches(
     plane: np.ndarray | None,
     middle: np.ndarray,
     gripper: Gripper,
-    width: np.ndarray,
     clearance: float,
 ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray]:
-    """The obstacles of a gripper that is open one to three clearances wider than the `width` of the part, (P,).
+    """The obstacles of a gripper that is open one to three clearances wider than the part.
 
-    `points` are those of the object, none if they are not to be checked; `middle`, (m, 3), are on this side of the
-    plane, (4,), and an approach is as long as their diagonal. The obstacles, (P, A) bool arrays by name, are those at
-    the least opening, for approaches that are free at none. Three (P, A) arrays follow: the least opening at which the
-    approach is free, the depth of the fingertips past the axis, and the number of sides of the part that have points,
-    as in `GraspCandidates`.
+    `points` are those that it must not touch, none if they are not to be checked; `middle`, (m, 3), are on this side of
+    the plane, (4,), and an approach is as long as their diagonal. The obstacles, (P, A) bool arrays by name, are those
+    at the least opening, for approaches that are free at none. Three (P, A) arrays follow: the least opening at which
+    the approach is free, the depth of the fingertips past the axis, and the number of sides of the part that have
+    points, as in `GraspCandidates`.
     """
     distance = float(np.linalg.norm(np.ptp(middle, axis=0)))
     surface = cells(points, CLOSE_POINTS * min(gripper.finger[:2]))
-    depth = np.minimum(gripper.reach, width / 2)
-    shape = approaches.approach.shape[:2]
+    width, shape = approaches.sections.width, approaches.approach.shape[:2]
+    depth = np.minimum(gripper.reach, approaches.sections.far)
+    aside = approaches.sections.shift[..., None, None] * [1.0, 0, 0]
+    too_wide = np.asarray(width + clearance > gripper.max_opening)
+    slanted = approaches.sections.contact < LEAST_CONTACT
     at_least_opening: dict[str, Any] = {}
     opening, sides_seen, free = np.full(shape, np.nan), np.zeros(shape, int), np.zeros(shape, bool)
     for times in CLEARANCES:
         wide = np.minimum(width + times * clearance, gripper.max_opening)
-        low, high = swept(gripper, wide, depth, clearance, distance)
-        possible, obstacles = ~free, dict[str, Any]()
+        low, high = (corner + aside for corner in swept(gripper, wide, depth, clearance, distance))
+        possible = ~(free | too_wide | slanted)
+        obstacles: dict[str, Any] = {"ways in where it is too wide": too_wide, "ways in to slanted sides": slanted}
         if len(points):
             touching = hits(approaches, surface, low, high, possible).any(axis=2)
             possible &= ~touching
-            occupied = hits(approaches, surface, *sides(gripper, wide, depth, width), possible)
+            first, last = (corner + aside for corner in sides(gripper, wide, depth, width))
+            occupied = hits(approaches, surface, first, last, possible)
             sides_seen = np.where(possible, occupied.sum(axis=2), sides_seen)
             empty = possible & ~occupied[..., :2].any(axis=2)
             possible &= ~empty
@@ -63,17 +77,17 @@ def check_approaches(
         behind = possible & (plane is not None and hits_plane(approaches, plane, middle, low, high).any(axis=2))
         possible &= ~behind
         obstacles["ways in behind the plane"] = behind
-        opening = np.where(possible, wide[:, None], opening)
+        opening = np.where(possible, wide, opening)
         free |= possible
         at_least_opening = at_least_opening or obstacles
     blocked = {name: approach & ~free for name, approach in at_least_opening.items()}
-    return blocked, opening, np.broadcast_to(depth[:, None], shape), sides_seen
+    return blocked, opening, depth, sides_seen
 
 
 def swept(
     gripper: Gripper, opening: np.ndarray, depth: np.ndarray, clearance: float, distance: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Corners, (P, 3, 3), of the boxes that the gripper sweeps on its approach, with half the clearance around them.
+    """Corners, (P, A, 3, 3), of the boxes that the gripper sweeps on its approach, with half the clearance around them.
 
     The inner faces of the fingers stay: between them and the part is half the clearance already.
     """
@@ -85,8 +99,8 @@ def swept(
 
 
 def sides(gripper: Gripper, opening: np.ndarray, depth: np.ndarray, width: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Corners of the boxes around three sides of the part, (P, 3, 3) float arrays: those on which the jaws close, and
-    the one towards the palm.
+    """Corners of the boxes around three sides of the part, (P, A, 3, 3) float arrays: those on which the jaws
+    close, and the one towards the palm.
 
     Of a round section each has what is within 30 degrees of its direction; jaws close as far to either side of the axis
     as their tips reach past it.
@@ -94,7 +108,7 @@ def sides(gripper: Gripper, opening: np.ndarray, depth: np.ndarray, width: np.nd
     jaw, core, across = opening / 2, SIDE_BEGINS * width / 2, np.full_like(opening, gripper.finger[1] / 2)
     low = [[-jaw, -across, -depth], [core, -across, -depth], [-jaw, -across, -jaw]]
     high = [[-core, across, depth], [jaw, across, depth], [jaw, across, -core]]
-    return np.moveaxis(np.array(low), 2, 0), np.moveaxis(np.array(high), 2, 0)
+    return np.array(low).transpose(2, 3, 0, 1), np.array(high).transpose(2, 3, 0, 1)
 
 
 def cells(points: np.ndarray, close: float) -> np.ndarray:
@@ -120,10 +134,10 @@ def hits(
 ) -> np.ndarray:
     """Which boxes have pieces of surface in them, (P, A, B) bool array, of the approaches that are `possible`, (P, A).
 
-    `surface` is what `cells` gives; `low` and `high`, (P, B, 3), are corners in the frame of the gripper: x closing, y
-    axis of the part, z approach.
+    `surface` is what `cells` gives; `low` and `high`, (P, A, B, 3), are corners in the frame of the gripper: x closing,
+    y axis of the part, z approach.
     """
-    hit = np.zeros((*possible.shape, low.shape[1]), bool)
+    hit = np.zeros((*possible.shape, low.shape[2]), bool)
     if not (len(surface) and possible.any()):
         return hit
     reach = norm(np.maximum(np.abs(low), np.abs(high))).max() + norm(surface - surface[:, :1]).max()
@@ -131,12 +145,12 @@ def hits(
     for place in np.flatnonzero(possible.any(axis=1)):
         rows, position, axis = np.flatnonzero(possible[place]), approaches.position[place], approaches.axis[place]
         first, last = _ends(surface @ axis - position @ axis)
-        near = np.flatnonzero((last > low[place, :, 1].min()) & (first < high[place, :, 1].max()))
+        near = np.flatnonzero((last > low[place, :, :, 1].min()) & (first < high[place, :, :, 1].max()))
         offset = surface[near] - position
         x, z = offset @ approaches.closing[place, rows].T, offset @ approaches.approach[place, rows].T
         least, most = zip(_ends(x), (first[near, None], last[near, None]), _ends(z), strict=True)
-        for box in range(low.shape[1]):
-            inside = [(most[i] > low[place, box, i]) & (least[i] < high[place, box, i]) for i in range(3)]
+        for box in range(low.shape[2]):
+            inside = [(most[i] > low[place, rows, box, i]) & (least[i] < high[place, rows, box, i]) for i in range(3)]
             hit[place, rows, box] = (inside[0] & inside[1] & inside[2]).any(axis=0)
     return hit
 
@@ -156,7 +170,7 @@ def hits_plane(
         normal, shift = -normal, -shift
     axis = np.broadcast_to(approaches.axis[:, None], approaches.approach.shape)
     slope = (np.stack([approaches.closing, axis, approaches.approach], axis=2) @ normal)[:, :, None]
-    lowest = np.where(slope > 0, low[:, None], high[:, None])
+    lowest = np.where(slope > 0, low, high)
     return (approaches.position @ normal + shift)[:, None, None] + (lowest * slope).sum(axis=3) < 0
 
 

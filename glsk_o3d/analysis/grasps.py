@@ -1,7 +1,11 @@
 """Candidates for grasps with parallel jaws along a skeleton, with a free approach."""
 
+import time
 import warnings
 from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,14 +13,25 @@ import numpy as np
 from ..data.points import surface_points
 from ..data.report import outside
 from ..data.skeleton import Skeleton
+from ..data.verdict import CODES, Verdict
 from ..errors import InvalidParameterError, SkeletonWarning
+from ..filters.outlier_remover import OutlierRemover
+from ..filters.sampler import Sampler
+from ..geometry.frame import MIN_POINTS
 from ..geometry.groups import group_rank
+from ..geometry.neighbourhoods import nearest_neighbours, principal
 from ..geometry.polylines import arc_lengths
 from ..parameters import check_number
 from .curves import check_places
 from .grasp_checks import Approaches, check_approaches, checked_plane
+from .grasp_sections import sections_at
 from .gripper import GraspCandidates, Gripper, in_words
 
+PLACES_AT_ONCE = 32  # speed: after how many places the clock is read
+WALL_POINTS = 16  # fitted: neighbours among outliers that show whether they form a wall
+WALL_FLATNESS = 0.01  # fitted: third over first principal spread of outliers that form a wall
+TURNS_PER_STEP = 2  # fitted: directions per approach direction, one of which is across the thin side of a flat part
+FLAT_PART = 0.9  # fitted: width across the thin side of a flat part, over that in the usual directions
 UNLIKELY_OPENING = 20.0  # derived: openings over diagonals: above those of hands and screws, below those of mm and m
 
 
@@ -25,20 +40,26 @@ def grasp_candidates(
     gripper: Gripper | float,
     *,
     cloud: Any = None,
+    mask: Any = None,
     plane: Any = None,
     clearance: float | None = None,
-    around: int = 8,
+    around: int = 12,
     spacing: float | None = None,
-    min_confidence: float = 0.5,
+    min_confidence: float = 0.25,
+    accept: Verdict | str = Verdict.DOUBTFUL,
+    outlier_factor: float = 2.5,
+    max_places: int | None = None,
+    seconds: float | None = None,
 ) -> GraspCandidates:
-    """Candidates for grasps with parallel jaws, from the axis and the radii of a skeleton's branches.
+    """Candidates for grasps with parallel jaws, from the axis and the sections of a skeleton's branches.
 
-    The jaws close across a branch, at places along its curve and from directions around it. The open gripper approaches
+    The jaws close across a branch, at places along its curve and from directions around it, one of which is across the
+    thin side of a flat part. The points of the branch give the width in each direction. The open gripper approaches
     in a straight line, from as far away as the diagonal of the object, until its fingertips are past the axis by its
     reach, but not past the part. Approaches are left out if a finger or the palm would touch points or reach behind a
-    table's plane, or if no points are between the jaws. Unseen space counts as free. The quality ranks candidates; it
-    does not measure force closure. Its formula, each step, and the sources (Vahrenkamp et al. 2018; ten Pas et al.
-    2017): docs/grasping.md.
+    table's plane, if no points are between the jaws, or if the surface is slanted where the jaws close. Unseen space
+    counts as free. The quality ranks candidates; it does not measure force closure. Its formula, each step, and the
+    sources (Vahrenkamp et al. 2018; ten Pas et al. 2017): docs/grasping.md.
 
     Parameters
     ----------
@@ -47,20 +68,33 @@ def grasp_candidates(
     gripper : Gripper or float
         Or its widest opening [cloud's units], with the other sizes in proportion.
     cloud : cloud, optional
-        All points that the gripper must not touch, also of other objects; by default the skeleton's. With an empty
+        All points that the gripper must not touch, such as the whole scene; by default the skeleton's. With an empty
         tuple a finger may go through the object.
+    mask : (N,) bool array, optional
+        Which points of `cloud` are of the object; by default the skeleton's points are the object.
     plane : (4,) array_like, optional
-        A table, as from Open3D's ``segment_plane``: solid behind it as seen from the points.
+        A table, as from Open3D's ``segment_plane``: solid behind it as seen from the object.
     clearance : float, optional
         Opening beyond the width w [cloud's units], half on either side; twice or three times as much where less is not
         free, as in noise. Half of it is also kept all around the gripper. By default a tenth of the widest opening.
     around : int
-        Approach directions at each place, evenly around the axis; the first is as near as possible to -z.
+        Approach directions at each place, evenly around the axis; the first is as near as possible to -z, or turned by
+        half a step where this is across the thin side.
     spacing : float, optional
-        Distance of the places along the curve [cloud's units]; by default the median radius of the branch. They keep
-        a radius away from the ends of the branch.
+        Distance of the places along the curve [cloud's units]; by default the median radius of the branch, at most the
+        width of a finger. They keep a radius away from the ends of the branch.
     min_confidence : float
-        Least confidence of the skeleton, from 0 to 1. 0 also takes unknown confidences.
+        Least confidence of the skeleton, from 0 to 1; 0 also takes unknown confidences.
+    accept : Verdict or str
+        Worst verdict of a skeleton that gets candidates: the axis of a sheet or a ball is no place to grasp. Its handle
+        may be one; with ``"no curve skeleton"`` it is searched.
+    outlier_factor : float
+        As of `glsk_o3d.OutlierRemover`: outliers are no obstacles. 0 makes every point one.
+    max_places : int, optional
+        Places to search, the most promising ones by confidence, width and contact.
+    seconds : float, optional
+        Wall time after which no further places are searched, these most promising ones first. At least one round of 32
+        places is.
 
     Returns
     -------
@@ -78,7 +112,8 @@ def grasp_candidates(
     Warns
     -----
     SkeletonWarning
-        There is no candidate, with the reason; or the gripper is so large that it may be in other units.
+        There is no candidate, with the reason; the verdict is not accepted; or the gripper is so large that it may be
+        in other units.
 
     Examples
     --------
@@ -88,66 +123,121 @@ def grasp_candidates(
     >>> axis = Skeleton(straight.nodes, straight.edges, straight.radii, (), (), (), confidence=[1, 1])
     >>> table = (0, 0, 1, 0.1)  # z = -0.1: the tube lies on it, and cannot be taken from below, nor from the side
     >>> grasp_candidates(axis, 0.4, cloud=straight.points, plane=table, clearance=0.05, around=4)
-    GraspCandidates(9 at 9 places; not taken: 27 ways in behind the plane)
+    GraspCandidates(10 at 10 places; not taken: 30 ways in behind the plane)
     """
     gripper = gripper if isinstance(gripper, Gripper) else Gripper(gripper)
     clearance = gripper.max_opening / 10 if clearance is None else clearance
-    _check(skeleton, clearance, around, spacing, min_confidence)
+    _check(skeleton, clearance, around, spacing, min_confidence, accept, max_places, seconds, outlier_factor)
+    stop = np.inf if seconds is None else time.monotonic() + seconds
     plane = None if plane is None else checked_plane(plane)
-    points = _object_points(skeleton, cloud)
-    middle = points if len(points) else skeleton.vertices
-    if gripper.max_opening > UNLIKELY_OPENING * np.linalg.norm(np.ptp(middle, axis=0)):
-        many = f"more than {UNLIKELY_OPENING:g} times as wide as the object is long"
-        warnings.warn(f"the gripper opens {many}: are the units the same?", SkeletonWarning, stacklevel=outside())
-    place, branch, width, quality, left_out, examined = _graspable_places(
-        skeleton, gripper, clearance, spacing, min_confidence
+    points, middle = _obstacles(skeleton, cloud, mask, outlier_factor)
+    _check_units(gripper, middle)
+    accepted = _is_accepted(skeleton, accept)
+    skeleton = skeleton if accepted else replace(skeleton, edges=np.empty((0, 2), int))
+    place, branch, approaches, left_out, examined = _graspable_places(
+        skeleton, gripper, clearance, around, spacing, min_confidence
     )
-    position, axis = place[:, :3], place[:, 3:6]
-    approach = _directions_around(axis, around)
-    approaches = Approaches(position, axis, approach, np.cross(axis[:, None], approach))
-    obstacles, opening, depth, seen = check_approaches(approaches, points, plane, middle, gripper, width, clearance)
-    free, blocked = _remaining(obstacles)
-    quality = quality[free // around] * (seen.ravel()[free] / 3 if len(points) else 1)
+    sections = approaches.sections
+    confidence = np.nan_to_num(place[:, 8], nan=1.0)[:, None]
+    quality = confidence * np.clip(1 - sections.width / gripper.max_opening, 0, None) * sections.contact
+    ranked = np.argsort(-quality.max(axis=1, initial=0).round(9), kind="stable")[:max_places]
+    search = partial(check_approaches, points=points, plane=plane, middle=middle, gripper=gripper, clearance=clearance)
+    opening, depth, seen, blocked, unsearched = _searched(search, approaches, ranked, stop)
+    if unsearched:
+        left_out["places beyond the budget"] = unsearched
+    free = np.flatnonzero(np.isfinite(opening))
+    if len(points):
+        quality = quality * seen / 3
+    value = quality.ravel()[free].round(9)
     # the best of each place, then the second best of each; in each round the best first; equal ones in their order
-    best = np.argsort(-quality.round(9), kind="stable")
-    order = best[np.argsort(group_rank(free[best] // around, len(place)), kind="stable")]
-    free, quality = free[order], quality[order]
+    best = np.argsort(-value, kind="stable")
+    free = free[best[np.argsort(group_rank(free[best] // around, len(place)), kind="stable")]]
     row = free // around
+    closing = approaches.closing.reshape(-1, 3)[free]
     candidates = GraspCandidates(
-        position=position[row],
-        approach=approach.reshape(-1, 3)[free],
-        closing=approaches.closing.reshape(-1, 3)[free],
+        position=place[row, :3] + sections.shift.ravel()[free, None] * closing,
+        approach=approaches.approach.reshape(-1, 3)[free],
+        closing=closing,
         opening=opening.ravel()[free],
         depth=depth.ravel()[free],
         branch=branch[row],
         confidence=place[row, 8],
-        quality=quality,
+        contact=sections.contact.ravel()[free],
+        quality=quality.ravel()[free],
         seen=seen.ravel()[free],
         gripper=gripper,
         places=examined,
         left_out=left_out | blocked,
     )
-    if len(candidates) == 0:
+    if len(candidates) == 0 and accepted:
         reason = in_words(candidates.left_out) or "the skeleton has no branch"
         warnings.warn(f"no grasp at {examined} places: {reason}", SkeletonWarning, stacklevel=outside())
     return candidates
 
 
+def _searched(
+    search: Callable[[Approaches], Any], approaches: Approaches, ranked: np.ndarray, stop: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict[str, int], int]:
+    """Opening, depth and number of seen sides of approaches, by a search of places in their rank until a time.
+
+    The opening is NaN of those that are not free. The obstacles are counted, and so are the places not searched.
+    """
+    shape = approaches.approach.shape[:2]
+    opening, depth, seen = np.full(shape, np.nan), np.zeros(shape), np.zeros(shape, int)
+    blocked: Counter[str] = Counter()
+    unsearched = shape[0]
+    for first in range(0, len(ranked), PLACES_AT_ONCE):
+        if first and time.monotonic() > stop:
+            break
+        rows = ranked[first : first + PLACES_AT_ONCE]
+        obstacles, opening[rows], depth[rows], seen[rows] = search(approaches.of(rows))
+        blocked.update(_remaining(obstacles)[1])
+        unsearched -= len(rows)
+    return opening, depth, seen, blocked, unsearched
+
+
+def _check_units(gripper: Gripper, middle: np.ndarray) -> None:
+    """Warn if a gripper is so large for the points of the object that it may be in other units."""
+    if gripper.max_opening > UNLIKELY_OPENING * np.linalg.norm(np.ptp(middle, axis=0)):
+        many = f"more than {UNLIKELY_OPENING:g} times as wide as the object is long"
+        warnings.warn(f"the gripper opens {many}: are the units the same?", SkeletonWarning, stacklevel=outside())
+
+
+def _is_accepted(skeleton: Skeleton, accept: Verdict | str) -> bool:
+    """Whether the verdict is at least as good; if not, a warning says why."""
+    verdict = skeleton.verdict
+    if verdict.is_at_least(Verdict(accept)):
+        return True
+    reason = "; ".join(it.text for it in skeleton.report.reasons if CODES[it.code] == verdict)
+    advice = f"accept={verdict.value!r} takes it all the same"
+    warnings.warn(f"{verdict.value} ({reason}): {advice}", SkeletonWarning, stacklevel=outside())
+    return False
+
+
 def _graspable_places(
-    skeleton: Skeleton, gripper: Gripper, clearance: float, spacing: float | None, min_confidence: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, int], int]:
-    """Places that fit between the jaws: as of `_places_on`, with branch, width and quality; the others are counted.
+    skeleton: Skeleton,
+    gripper: Gripper,
+    clearance: float,
+    around: int,
+    spacing: float | None,
+    min_confidence: float,
+) -> tuple[np.ndarray, np.ndarray, Approaches, dict[str, int], int]:
+    """Places that fit between the jaws: as of `_places_on`, with branch and approaches; the others are counted.
 
     The counts are those of the rejected places, by reason, and of all examined ones.
     """
-    places = [_places_on(skeleton, path, spacing) for path in skeleton.branches]
+    places = [_places_on(skeleton, path, spacing, gripper.finger[1]) for path in skeleton.branches]
     counts = np.array(list(map(len, places)), int)
     place, branch = np.concatenate([np.empty((0, 9)), *places]), np.repeat(np.arange(len(places)), counts)
-    radius, slope, confidence = place[:, 6:].T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        even = np.sqrt(np.clip(1 - slope**2, 0, None))
-        width = 2 * radius / even
-        quality = np.nan_to_num(confidence, nan=1.0) * (1 - width / gripper.max_opening) * even
+    finer = TURNS_PER_STEP if around > 1 else 1
+    approach = _directions_around(place[:, 3:6], finer * around)
+    closing = np.cross(place[:, None, 3:6], approach)
+    sections = sections_at(skeleton, branch, place, (approach, closing), gripper)
+    turn = _turn_across(sections.width, around)
+    columns = (finer * np.arange(around) + turn[:, None]) % (finer * around)
+    every = np.arange(len(place))[:, None], columns
+    approaches = Approaches(place[:, :3], place[:, 3:6], approach[every], closing[every], sections.of(every))
+    width, confidence = approaches.sections.width.min(axis=1), place[:, 8]
     reasons = {
         "unknown radius": np.isnan(width),
         "too wide": width + clearance > gripper.max_opening,
@@ -156,7 +246,19 @@ def _graspable_places(
     remaining, left_out = _remaining(reasons)
     if not counts.all():
         left_out["branches without a place between their margins"] = int((counts == 0).sum())
-    return place[remaining], branch[remaining], width[remaining], quality[remaining], left_out, len(place)
+    return place[remaining], branch[remaining], approaches.of(remaining), left_out, len(place)
+
+
+def _turn_across(width: np.ndarray, around: int) -> np.ndarray:
+    """Columns by which the directions of each place are turned, so that one is across the thin side of a flat part."""
+    finer = width.shape[1] // around
+    if finer == 1:
+        return np.zeros(len(width), int)
+    turns = np.arange(-(finer // 2) + 1, finer // 2 + 1)
+    columns = (finer * np.arange(around) + turns[:, None]) % (finer * around)
+    narrowest = width[:, columns].min(axis=2)  # (P, turns)
+    narrow = narrowest.min(axis=1) < FLAT_PART * narrowest[:, turns == 0][:, 0]
+    return np.where(narrow, turns[narrowest.argmin(axis=1)], 0)
 
 
 def _remaining(reasons: dict[str, np.ndarray]) -> tuple[np.ndarray, dict[str, int]]:
@@ -165,7 +267,7 @@ def _remaining(reasons: dict[str, np.ndarray]) -> tuple[np.ndarray, dict[str, in
     return np.flatnonzero(first == ""), dict(Counter(first[first != ""].tolist()))
 
 
-def _places_on(skeleton: Skeleton, path: np.ndarray, spacing: float | None) -> np.ndarray:
+def _places_on(skeleton: Skeleton, path: np.ndarray, spacing: float | None, widest: float) -> np.ndarray:
     """Places along a branch, (n, 9): position, axis, radius, its slope, confidence."""
     curve, radii = skeleton.vertices[path], skeleton.radii[path]
     along = arc_lengths(curve)
@@ -174,7 +276,7 @@ def _places_on(skeleton: Skeleton, path: np.ndarray, spacing: float | None) -> n
         return np.empty((0, 9))
     closed = path[0] == path[-1] and skeleton.degree[path[0]] == 2
     median_radius = np.nanmedian(radii) if np.isfinite(radii).any() else 0.0
-    step = spacing or median_radius or length / 10
+    step = spacing or min(median_radius or length / 10, widest)
     check_places(length, step)
     if closed:
         count = max(round(length / step), 1)
@@ -213,20 +315,47 @@ def _directions_around(axis: np.ndarray, n: int) -> np.ndarray:
     return np.cos(turn) * first[:, None] + np.sin(turn) * np.cross(axis, first)[:, None]
 
 
-def _object_points(skeleton: Skeleton, cloud: Any) -> np.ndarray:
-    """The points of the object, none for an empty `cloud`."""
-    if isinstance(cloud, tuple | list) and len(cloud) == 0:
-        return np.empty((0, 3))
-    whole = skeleton.whole
+def _obstacles(skeleton: Skeleton, cloud: Any, mask: Any, factor: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points that a gripper must not touch, none for an empty `cloud`, and those of the object or its vertices."""
+    whole, none = skeleton.whole, isinstance(cloud, tuple | list) and len(cloud) == 0
     if cloud is None and (skeleton.lacks_sample or len(whole.points) == 0):
         raise InvalidParameterError(
             "this skeleton has no points of the object: give its cloud (--cloud), or cloud=() to check nothing"
         )
-    points = whole.points if cloud is None else surface_points(cloud)
-    return points[np.isfinite(points).all(axis=1)]
+    points = np.empty((0, 3)) if none else whole.points if cloud is None else surface_points(cloud)
+    chosen = None if mask is None else np.asarray(mask)
+    if chosen is not None and (chosen.shape != (len(points),) or chosen.dtype != bool or not chosen.any()):
+        raise InvalidParameterError(f"mask: must be a bool array of the {len(points)} points of the cloud, some True")
+    thing = points[chosen] if chosen is not None else points if len(whole.points) == 0 else whole.points
+    points, thing = (it[np.isfinite(it).all(axis=1)] for it in (points, thing))
+    return points[~_outliers(points, factor)], thing if len(thing) else skeleton.vertices
 
 
-def _check(skeleton: Skeleton, clearance: Any, around: Any, spacing: Any, min_confidence: Any) -> None:
+def _outliers(points: np.ndarray, factor: float) -> np.ndarray:
+    """Outliers among points, (N,) bool array, without those that form a sparse wall among themselves."""
+    if not factor or len(points) <= MIN_POINTS:
+        return np.zeros(len(points), bool)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SkeletonWarning)
+        outlier = (Sampler() | OutlierRemover(outlier_factor=factor))(points).outlier.copy()
+    rows = np.flatnonzero(outlier)
+    if len(rows) > WALL_POINTS:
+        third, _, first = principal(points[rows], nearest_neighbours(points[rows], WALL_POINTS)[1])[0].T
+        outlier[rows[third < WALL_FLATNESS * first]] = False
+    return outlier
+
+
+def _check(
+    skeleton: Skeleton,
+    clearance: Any,
+    around: Any,
+    spacing: Any,
+    min_confidence: Any,
+    accept: Any,
+    max_places: Any,
+    seconds: Any,
+    outlier_factor: Any,
+) -> None:
     if len(skeleton.vertices) == 0:
         raise InvalidParameterError("the skeleton is empty: there is nothing to grasp")
     if not np.isfinite(skeleton.radii).any():
@@ -237,3 +366,8 @@ def _check(skeleton: Skeleton, clearance: Any, around: Any, spacing: Any, min_co
     check_number("spacing", spacing, "float?", low=0, open_low=True)
     check_number("min_confidence", min_confidence, low=0, high=1)
     check_number("around", around, "int", low=1)
+    if accept not in list(Verdict):
+        raise InvalidParameterError(f"accept = {accept!r}: must be one of {', '.join(it.value for it in Verdict)}")
+    check_number("max_places", max_places, "int?", low=1)
+    check_number("seconds", seconds, "float?", low=0)
+    check_number("outlier_factor", outlier_factor, low=0)

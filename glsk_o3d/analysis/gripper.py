@@ -98,6 +98,9 @@ class GraspCandidates(Rows, row="grasp"):
         Position in `Skeleton.branches`.
     confidence, quality : (G,) float arrays
         From 0 to 1; the skeleton's confidence there is NaN where it is unknown.
+    contact : (G,) float array
+        Cosine of the angle between the closing direction and the surface, at the worse of both jaws, as the points of
+        the object show it; of a round section without points that of the slope along the part.
     seen : (G,) int array
         Number of sides with points of the three around the gripper: two at the jaws and one towards the palm. Unseen
         surface may be in the way. 0 if not checked.
@@ -116,6 +119,7 @@ class GraspCandidates(Rows, row="grasp"):
     depth: np.ndarray
     branch: np.ndarray
     confidence: np.ndarray
+    contact: np.ndarray
     quality: np.ndarray
     seen: np.ndarray
     gripper: Gripper

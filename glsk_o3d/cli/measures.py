@@ -104,7 +104,7 @@ def grasps(
     opening: Annotated[float, option("LENGTH", "Of the gripper, at its widest.")],
     cloud: Annotated[Path | None, option("FILE", "Points not to touch; by default those of the skeleton.")] = None,
     plane: Annotated[str | None, option("A,B,C,D", "A table, ax + by + cz + d = 0.")] = None,
-    min_confidence: Annotated[float, option("SHARE", "Of the skeleton, from 0 to 1.")] = 0.5,
+    min_confidence: Annotated[float, option("SHARE", "Of the skeleton, from 0 to 1.")] = 0.25,
     count: Annotated[int, option("N", "How many to show and write, of each place its best first.", "-n", min=1)] = 20,
     output: Annotated[list[Path] | None, output_option("FILE", "json or csv; may be repeated.")] = None,
 ) -> None:

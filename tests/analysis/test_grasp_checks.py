@@ -28,7 +28,7 @@ def sheet(x, y, z, step=0.01):
 
 
 def grasp(skeleton, **options):
-    return grasp_candidates(skeleton, HAND, **{"clearance": CLEARANCE, **options})
+    return grasp_candidates(skeleton, HAND, **{"clearance": CLEARANCE, "around": 8, "spacing": 0.1, **options})
 
 
 def check_same(grasps, others):
@@ -215,3 +215,81 @@ def test_a_gripper_in_proportion():
 def test_impossible_grippers_are_refused(options):
     with pytest.raises(InvalidParameterError):
         Gripper(**options)
+
+
+def bar(n=6000, half=(0.6, 0.12, 0.04), turn=0.5, seen=None):
+    """A flat bar along x, turned about it, with the points of its surface, or those `seen`, and its axis."""
+    rng = np.random.default_rng(0)
+    points, side = rng.uniform(-1, 1, (n, 3)) * half, rng.integers(1, 3, n)
+    row, sign = np.arange(n), rng.choice([-1, 1], n)
+    normals = np.zeros((n, 3))
+    points[row, side] = sign * np.array(half)[side]
+    normals[row, side] = 1
+    rotation = Rotation.from_rotvec([turn, 0, 0])
+    shown = np.ones(n, bool) if seen is None else seen(points)
+    x = np.linspace(-0.6, 0.6, 13)
+    axis, edges, radius = x[:, None] * [1.0, 0, 0], np.column_stack([row[:12], row[1:13]]), np.sqrt(half[1] * half[2])
+    owner = abs(points[shown, :1] - x).argmin(axis=1)
+    places, facing = rotation.apply(points[shown]), rotation.apply(normals[shown])
+    return Skeleton(axis, edges, [radius] * 13, owner, places, facing, confidence=[1] * 13), rotation
+
+
+def test_the_jaws_close_across_the_thin_side():
+    skeleton, turn = bar()
+    best = grasp(skeleton)
+    best = best[: best.places]
+    np.testing.assert_allclose(abs(best.closing @ turn.apply([0, 0, 1])), 1, atol=0.02)
+    np.testing.assert_allclose(best.opening, 0.08 + CLEARANCE, atol=0.03)  # turned by 6 degrees
+    np.testing.assert_allclose(best.contact, 1, atol=0.05)
+
+
+def test_an_unseen_side_is_as_far_as_the_other_and_the_middle_is_between_the_jaws():
+    half, _ = bar(turn=0.0, seen=lambda points: points[:, 2] > 0)
+    best = grasp(half, around=4)
+    across = abs(best.closing[:, 2]) > 0.99
+    np.testing.assert_allclose(best.opening[across], 0.08 + CLEARANCE, atol=0.01)
+    assert best.seen[across].max() == 2
+    whole, _ = bar(turn=0.0)
+    lowered = grasp(replace(whole, vertices=whole.vertices - [0, 0, 0.01]), around=4)  # an axis beside the middle
+    np.testing.assert_allclose(lowered.position[abs(lowered.closing[:, 2]) > 0.99, 2], 0, atol=2e-3)
+
+
+def test_outliers_do_not_block_fingers():
+    free, rng = grasp(rod()), np.random.default_rng(1)
+    scattered = rod(rng.uniform(-0.8, 0.8, (60, 3)))
+    assert len(grasp(scattered)) > 0.9 * len(free)
+    with pytest.warns(SkeletonWarning, match="touch"):
+        assert len(grasp(scattered, outlier_factor=0)) == 0
+
+
+def test_a_budget_takes_the_best_places_first():
+    skeleton, _ = bar()
+    everything, some = grasp(skeleton), grasp(skeleton, max_places=3)
+    assert some.left_out["places beyond the budget"] == everything.places - 3
+    assert len(np.unique(some.branch * 1e3 + some.position[:, 0].round(2))) == 3
+    assert some.quality.max() >= everything.quality.max() - 0.02
+    assert len(grasp(skeleton, spacing=0.001, seconds=0)) > 0  # at least one round
+    assert "places beyond the budget" in grasp(skeleton, spacing=0.001, seconds=0).left_out
+
+
+def test_the_scene_is_an_obstacle_and_the_mask_says_what_the_object_is():
+    alone, walled = rod(), rod(WALL)
+    mask = np.arange(len(walled.points)) < len(alone.points)
+    plain = replace(alone, points=(), normals=(), vertex_of_point=())
+    masked = grasp(plain, cloud=walled.points, mask=mask)
+    assert masked.left_out[TOUCHING] == 3 * masked.places
+    check_same(masked, grasp(walled))
+    assert grasp(alone, cloud=walled.points).left_out == masked.left_out
+    for wrong in (mask[:5], 1 * mask, ~mask & mask):
+        with pytest.raises(InvalidParameterError, match="mask"):
+            grasp(plain, cloud=walled.points, mask=wrong)
+
+
+def test_no_curve_skeleton_has_no_grasps_unless_it_is_accepted():
+    skeleton = rod()
+    sheet_like = skeleton.with_report(skeleton.report.with_reason("sheet", "this is a sheet"))
+    with pytest.warns(SkeletonWarning, match="no curve skeleton.*this is a sheet.*accept"):
+        assert len(grasp(sheet_like)) == 0
+    assert len(grasp(sheet_like, accept="no curve skeleton")) == len(grasp(skeleton))
+    with pytest.raises(InvalidParameterError, match="accept"):
+        grasp(skeleton, accept="any")

@@ -125,14 +125,14 @@ def test_every_place_has_grasps_or_a_reason():
     ("skeleton", "gripper"),
     [
         (TUBE, 0.2),
-        (axis_of(samples.tube(10), 0.3), 1.0),
+        (axis_of(samples.tube(10), 0.2), 1.0),
         (replace(TUBE, radii=[0.6, 0.6]), 2.0),
         (replace(TUBE, edges=()), 1.0),
     ],
     ids=["too wide", "uncertain", "too short", "without a branch"],
 )
 def test_where_there_is_no_grasp_a_warning_says_why(skeleton, gripper, tmp_path):
-    with pytest.warns(SkeletonWarning, match="no grasp at [09] places: ."):
+    with pytest.warns(SkeletonWarning, match=r"no grasp at \d+ places: ."):
         grasps = grasp_candidates(skeleton, gripper)
     assert len(grasps) == len(list(grasps)) == 0
     assert grasps.position.shape == grasps.approach.shape == grasps.closing.shape == grasps.axis.shape == (0, 3)

@@ -25,8 +25,8 @@ def test_lines_files_and_json_agree(invoke, tmp_path, rod):
     result = invoke(*words, "-o", "g.json")
     assert (result.exit_code, result.stderr) == (0, "")
     lines = result.stdout.splitlines()
-    assert lines[0].startswith(f"{len(actual)} grasps at 9 places, ")
-    assert lines[1] == f"left out: {5 * 9} ways in behind the plane"
+    assert lines[0].startswith(f"{len(actual)} grasps at 10 places, ")
+    assert lines[1] == f"left out: {9 * 10} ways in behind the plane"
     rows = [line for line in lines if line.endswith(" 0") and "left out" not in line]
     assert len(rows) == len({row.split()[0] for row in rows}) == 5  # places
     reported, printed = json.loads((tmp_path / "g.json").read_text()), json.loads(invoke(*words, "--json").stdout)

@@ -87,6 +87,19 @@ def test_with_an_opening_poses_are_grasps_above_a_table(ros, cloud, expected, ro
     assert "too wide" in warning
 
 
+def test_a_crop_is_what_is_worked_on(ros, cloud, points):
+    low, high = points.min(axis=0), points.max(axis=0)
+    high[0] = low[0] + 0.6 * (high[0] - low[0])
+    node = ros.node(crop=[*(low - 1), *high.tolist()])
+    node.on_cloud(cloud)
+    places = np.array([[it.position.x, it.position.y, it.position.z] for it in node.published[1][1].poses])
+    assert len(places)
+    assert (places[:, 0] <= high[0]).all()
+    nothing = ros.node(crop=[5.0, 5.0, 5.0, 6.0, 6.0, 6.0])
+    nothing.on_cloud(cloud)
+    assert nothing.logged == ["cloud left out: the cloud has 0 finite points, and min_points is 100"]
+
+
 def test_a_bad_cloud_is_one_warning_and_the_next_is_served(ros, cloud, header, make_message, monkeypatch):
     node = ros.node()
     node.on_cloud(make_message(CLOUD, header=header))
@@ -112,6 +125,8 @@ def test_a_bad_cloud_is_one_warning_and_the_next_is_served(ros, cloud, header, m
         (dict(pipeline="defualt"), "did you mean 'default'"),
         (dict(set=["k=no"]), "k = 'no'"),
         (dict(opening=float("nan")), "opening = nan"),
+        (dict(crop=[0.0, 0.0, 1.0, 1.0, 1.0, 0.0]), "crop = .*must be least x, y, z and greatest"),
+        (dict(accept="any"), "accept = 'any'"),
         (dict(plane=[0.0, 0.0, 1.0]), r"plane = \[0.0, 0.0, 1.0\]: must be a, b, c, d"),
         (dict(plane=[0.0, 0.0, 1.0, 0.0]), "is for grasps: give the opening"),
     ],

@@ -1,15 +1,17 @@
-"""Grasps: how many of the best put a finger through the object, without and with a look at its points.
+"""Grasps: how many of the best put a finger through the object, and how many of the first ten would hold it.
 
 The README of the benchmarks says what each command shows.
 """
 
 from __future__ import annotations
 
+import os
 import time
 import warnings
 from collections.abc import Callable
 from functools import cache
 from itertools import product
+from pathlib import Path
 from typing import Annotated
 
 import numpy as np
@@ -38,6 +40,20 @@ USUAL_OPENING = 0.25
 STEPS = (9, 9, 25)  # of the grid in a box, at rest; on the way in, as close
 COLUMNS = [(condition, key) for condition in CONDITIONS for key in ("alone", "checked")] + [(CONDITIONS[-1], "seen")]
 WORDS = {"alone": "axis alone", "checked": "checked", "seen": "all sides seen"}
+
+DIAGONALS = {  # of real things, whose meshes have the diagonal 1 [m]
+    **dict(adjustable_wrench=0.25, binoculars=0.18, bleach_cleanser=0.27, cup=0.11, doorknob=0.12, femur=0.45),
+    **dict(flashlight=0.2, flat_screwdriver=0.21, fryingpan=0.45, hammer=0.3, knife=0.3, large_clamp=0.24),
+    **dict(medium_clamp=0.15, toothpaste=0.2, toy_airplane=0.25, waterbottle=0.25, bear=0.2, cat=0.2, dino=0.25),
+    **dict(cow=0.2, elk=0.25, triceratops=0.25, turtle=0.18, cheburashka=0.2, mug=0.0, power_drill=0.0, banana=0.0),
+}
+FIRST = 10
+ANY = "no curve skeleton"  # accepted: what is a sheet or a ball may have a handle
+PIXELS, VIEW = (160, 120), 26.0  # of a depth image; its angle of view [degrees]
+CONTACT = 0.002  # how far a soft jaw gives way: what it touches is that near to the first contact [m]
+ANTIPODAL = np.cos(np.radians(20))
+SURFACE = 300_000  # points that show a mesh to the boxes of a gripper
+VIEWS = ("two cameras", "2 % outliers")
 
 app = application(__doc__)
 
@@ -215,3 +231,117 @@ def pierced(
     cases = product(shapes.split(","), CONDITIONS, range(draws))
     work = [(dict(shape=it, condition=how, seed=seed), (it, how, points, seed)) for it, how, seed in cases]
     publish(run(measure, work, jobs), tables, output, page, "pierced")
+
+
+@cache
+def mesh_of(name: str, folder: str) -> o3d.geometry.TriangleMesh:
+    """A thing of real size: a mesh of the folder, that around a scan, or the mug."""
+    if name == "mug":
+        return mug_meshes()[0] + mug_meshes()[1]
+    file = Path(folder) / "meshes" / f"{name}.ply"
+    if file.exists():
+        mesh = o3d.io.read_triangle_mesh(os.fspath(file))
+        return mesh.scale(DIAGONALS[name], np.zeros(3))
+    scan = o3d.io.read_point_cloud(os.fspath(Path(folder) / "data" / f"ycb_{name}.ply"))
+    scan.estimate_normals()
+    scan.orient_normals_consistent_tangent_plane(20)
+    return o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(scan, depth=8)[0]
+
+
+def depth_cloud(mesh: o3d.geometry.TriangleMesh, n: int, condition: str, seed: int) -> np.ndarray:
+    """Points of two depth images."""
+    scene, places = scene_of([mesh]), []
+    middle = mesh.get_axis_aligned_bounding_box().get_center()
+    for eye in cameras(np.asarray(mesh.vertices)):
+        rays = scene.create_rays_pinhole(VIEW, middle, eye, np.array([0.0, 0, 1]), *PIXELS)
+        depth = scene.cast_rays(rays)["t_hit"].numpy()[..., None]
+        rays = rays.numpy()
+        places.append((rays[..., :3] + depth * rays[..., 3:])[np.isfinite(depth[..., 0])])
+    rng, points = np.random.default_rng(seed), np.concatenate(places).astype(float)
+    points = rng.permutation(points)[:n]
+    if condition == VIEWS[1]:
+        low, size = points.min(axis=0), np.ptp(points, axis=0)
+        points = np.concatenate([points, low + size * (1.2 * rng.random((len(points) // 50, 3)) - 0.1)])
+    return points
+
+
+def holds(grasps: GraspCandidates, mesh: o3d.geometry.TriangleMesh) -> np.ndarray:
+    """Whether grasps are free at rest, free on the way in, and antipodal: (G, 3) bool array."""
+    scene, rows = scene_of([mesh]), np.zeros((len(grasps), 3), bool)
+    o3d.utility.random.seed(0)
+    places = np.asarray(mesh.sample_points_uniformly(SURFACE).points)
+    distance = np.linalg.norm(np.ptp(places, axis=0))
+    corners = grasps.gripper.boxes(grasps.opening, grasps.depth)
+    for row, (pose, low, high) in enumerate(zip(grasps.poses, *corners, strict=True)):
+        local = ((places - pose[:3, 3]) @ pose[:3, :3])[:, None]
+        beside = ((local > low) & (local < high))[..., :2].all(axis=2)
+        rows[row, 0] = not (beside & (local[..., 2] > low[:, 2]) & (local[..., 2] < high[:, 2])).any()
+        rows[row, 1] = not (beside & (local[..., 2] > low[:, 2] - distance) & (local[..., 2] < high[:, 2])).any()
+        jaw, low, high = (
+            grasps.opening[row] / 2,
+            low[0],
+            high[0],
+        )  # the inner face of a finger, of the same size on both
+        pad = np.stack(np.meshgrid(0, *(np.linspace(low[i], high[i], n) for i, n in ((1, 9), (2, 33)))), axis=-1)
+        cosines = []
+        for side in (-1.0, 1.0):
+            start = (pad.reshape(-1, 3) + [side * jaw, 0, 0]) @ pose[:3, :3].T + pose[:3, 3]
+            inwards = np.broadcast_to(-side * pose[:3, 0], start.shape)
+            hit = scene.cast_rays(np.hstack([start, inwards]).astype(np.float32))
+            way, normal = hit["t_hit"].numpy(), hit["primitive_normals"].numpy()
+            touched = way < min(way.min() + CONTACT, 2 * jaw)
+            mean = (normal[touched] * np.sign(normal[touched] @ pose[:3, 0])[:, None]).sum(axis=0)
+            cosines.append(mean @ pose[:3, 0] / max(np.linalg.norm(mean), 1e-12))
+        rows[row, 2] = min(cosines) >= ANTIPODAL
+    return rows
+
+
+def measure_held(name: str, condition: str, n: int, folder: str) -> dict:
+    """The first grasps of a thing seen by two cameras, and how many of them would hold the mesh."""
+    mesh = mesh_of(name, folder)
+    points = depth_cloud(mesh, n, condition, 0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        skeleton = skeletonize(points)
+        start = time.process_time()
+        found = grasp_candidates(skeleton, OPENING["mug"], accept=ANY)
+        seconds = time.process_time() - start
+    rest, coming, antipodal = holds(found[:FIRST], mesh).T
+    numbers = dict(free=rest, way=rest & coming, good=rest & antipodal, whole=rest & coming & antipodal)
+    counts = {key: int(value.sum()) for key, value in numbers.items()}
+    return dict(found=len(found), first=len(rest), seconds=seconds, verdict=skeleton.verdict.value, **counts)
+
+
+def tables_held(rows: list[dict]) -> Tables:
+    """A line for each thing: of the first grasps those that are free and antipodal, in each condition."""
+    lines = []
+    for name in dict.fromkeys(row["thing"] for row in rows):
+        cells = []
+        for condition in VIEWS:
+            for row in good(pick(rows, thing=name, condition=condition)):
+                cells += [f"{row['good']} of {row['first']}", str(row["whole"]), str(row["found"])]
+        lines.append([name, *cells])
+    sums = [
+        [f"{sum(r['good'] for r in each)} of {sum(r['first'] for r in each)}", str(sum(r["whole"] for r in each)), ""]
+        for each in (good(pick(rows, condition=condition)) for condition in VIEWS)
+    ]
+    lines.append(["all", *(cell for cells in sums for cell in cells)])
+    header = ["object", *(f"{view}{word}" for view in VIEWS for word in ("", ", free on the way", ", all grasps"))]
+    return [(f"Of the first {FIRST} grasps, free and antipodal", header, lines)]
+
+
+@app.command()
+def held(
+    folder: Annotated[str, typer.Option("--folder", metavar="FOLDER", help="With meshes/ and data/.")],
+    things: Annotated[str, typer.Option("--things", metavar="NAMES", help="With commas; else all.")] = ",".join(
+        DIAGONALS
+    ),
+    points: Annotated[int, typer.Option("--points", min=100)] = 8192,
+    jobs: Jobs = 2,
+    output: Output = None,
+    page: Page = None,
+) -> None:
+    """The first grasps of things seen by two depth cameras: free, and antipodal, on their meshes."""
+    cases = product(things.split(","), VIEWS)
+    work = [(dict(thing=it, condition=how), (it, how, points, folder)) for it, how in cases]
+    publish(run(measure_held, work, jobs), tables_held, output, page, "held")

@@ -17,7 +17,7 @@ from visualization_msgs.msg import MarkerArray
 
 from glsk_o3d import GlskError
 
-from .skeletonizer import NO_PLANE, Skeletonizer
+from .skeletonizer import NO_CROP, NO_PLANE, Skeletonizer
 
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Of clouds, as sensors send them: those that come while one is worked on are dropped, but for the last."""
@@ -50,6 +50,8 @@ class SkeletonizeNode(Node):
             min_points=self.declare_parameter("min_points", 100).value,
             opening=self.declare_parameter("opening", 0.0).value,
             plane=self.declare_parameter("plane", list(NO_PLANE)).value,
+            crop=self.declare_parameter("crop", list(NO_CROP)).value,
+            accept=self.declare_parameter("accept", "doubtful").value,
         )
         self.markers = self.create_publisher(MarkerArray, "~/markers", LATEST)
         self.poses = self.create_publisher(PoseArray, "~/poses", LATEST)

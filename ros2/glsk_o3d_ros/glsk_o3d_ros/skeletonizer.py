@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from glsk_o3d import InvalidCloudError, InvalidParameterError, Skeleton, SkeletonWarning
+from glsk_o3d import InvalidCloudError, InvalidParameterError, Skeleton, SkeletonWarning, Verdict
 from glsk_o3d.analysis import Gripper, grasp_candidates
 from glsk_o3d.analysis.grasp_checks import checked_plane
 from glsk_o3d.api import as_pipeline
@@ -18,6 +18,7 @@ from glsk_o3d.cli.overrides import override
 from .messages import Make, frames_of, markers_of, points_of, poses_of
 
 NO_PLANE = (0.0, 0.0, 0.0, 0.0)
+NO_CROP = (0.0,) * 6
 
 
 @dataclass(frozen=True)
@@ -47,11 +48,17 @@ class Skeletonizer:
         Widest opening of a gripper, in the cloud's units; 0 for none.
     plane : sequence of 4 floats
         A table, ax + by + cz + d = 0, in the frame of the cloud: no grasp reaches behind it. Four zeros for none.
+    crop : sequence of 6 floats
+        Least x, y, z and greatest x, y, z of the points that are worked on, in the frame of the cloud. Six zeros
+        for all.
+    accept : str
+        Worst verdict of a skeleton that gets grasps.
 
     Raises
     ------
     GlskError
-        The pipeline, its recipe, a setting, the opening or the plane is wrong, or there is a plane without an opening.
+        The pipeline, its recipe, a setting, the opening, the plane, the crop or the verdict is wrong, or there is
+        a plane without an opening.
     """
 
     def __init__(
@@ -62,6 +69,8 @@ class Skeletonizer:
         min_points: int = 100,
         opening: float = 0.0,
         plane: Sequence[float] = NO_PLANE,
+        crop: Sequence[float] = NO_CROP,
+        accept: str = Verdict.DOUBTFUL.value,
     ) -> None:
         if not opening >= 0:
             raise InvalidParameterError(f"opening = {opening}: must be 0, for no grasps, or more")
@@ -74,6 +83,11 @@ class Skeletonizer:
         self.plane = checked_plane(plane) if any(plane) else None
         if not opening and any(plane):
             raise InvalidParameterError("plane is for grasps: give the opening of the gripper, too")
+        if len(crop) != 6 or (any(crop) and not np.less(crop[:3], crop[3:]).all()):
+            raise InvalidParameterError(f"crop = {list(crop)}: must be least x, y, z and greatest; all 0 for none")
+        if accept not in list(Verdict):
+            raise InvalidParameterError(f"accept = {accept!r}: must be one of {', '.join(it.value for it in Verdict)}")
+        self.crop, self.accept = np.reshape(crop, (2, 3)) if any(crop) else None, accept
         self.pipeline = override(as_pipeline(pipeline), filter(None, settings))
 
     def __call__(self, cloud: Any) -> Results:
@@ -84,6 +98,8 @@ class Skeletonizer:
         """
         points = points_of(cloud)
         points = points[np.isfinite(points).all(axis=1)]
+        if self.crop is not None:
+            points = points[((points >= self.crop[0]) & (points <= self.crop[1])).all(axis=1)]
         if len(points) < self.min_points:
             raise InvalidCloudError(f"the cloud has {len(points)} finite points, and min_points is {self.min_points}")
         with warnings.catch_warnings(record=True) as caught:
@@ -93,7 +109,7 @@ class Skeletonizer:
             if self.gripper is None:
                 frames = frames_of(skeleton)
             else:
-                frames = grasp_candidates(skeleton, self.gripper, plane=self.plane).poses
+                frames = grasp_candidates(skeleton, self.gripper, plane=self.plane, accept=self.accept).poses
         return Results(
             markers_of(skeleton, cloud.header, self.make),
             poses_of(frames, cloud.header, self.make),

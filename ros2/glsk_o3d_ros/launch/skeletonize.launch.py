@@ -14,6 +14,8 @@ PARAMETERS = {
     "min_points": (int, "100", "Fewest points of a cloud to work on."),
     "opening": (float, "0.0", "Widest opening of a gripper [m]: poses are then grasps; 0 for frames along the curve."),
     "plane": (List[float], "[0.0, 0.0, 0.0, 0.0]", "A table, ax + by + cz + d = 0, for grasps; all 0 for none."),  # noqa: UP006
+    "crop": (List[float], "[0.0, 0.0, 0.0, 0.0, 0.0, 0.0]", "Least and greatest x, y, z to work on; all 0 for all."),  # noqa: UP006
+    "accept": (str, "doubtful", "Worst verdict of a skeleton that gets grasps."),
 }
 
 
