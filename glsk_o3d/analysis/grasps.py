@@ -27,6 +27,7 @@ from .grasp_checks import Approaches, check_approaches, checked_plane
 from .grasp_sections import sections_at
 from .gripper import GraspCandidates, Gripper, in_words
 
+TABLE_SHARE = 0.05  # fitted: of the opening, the distance from a plane up to which points are of the table
 PLACES_AT_ONCE = 32  # speed: after how many places the clock is read
 WALL_POINTS = 16  # fitted: neighbours among outliers that show whether they form a wall
 WALL_FLATNESS = 0.01  # fitted: third over first principal spread of outliers that form a wall
@@ -73,7 +74,8 @@ def grasp_candidates(
     mask : (N,) bool array, optional
         Which points of `cloud` are of the object; by default the skeleton's points are the object.
     plane : (4,) array_like, optional
-        A table, as from Open3D's ``segment_plane``: solid behind it as seen from the object.
+        A table, as from Open3D's ``segment_plane``: solid behind it as seen from the object. It stands for the points
+        that are up to a twentieth of the opening away from it.
     clearance : float, optional
         Opening beyond the width w [cloud's units], half on either side; twice or three times as much where less is not
         free, as in noise. Half of it is also kept all around the gripper. By default a tenth of the widest opening.
@@ -131,6 +133,9 @@ def grasp_candidates(
     stop = np.inf if seconds is None else time.monotonic() + seconds
     plane = None if plane is None else checked_plane(plane)
     points, middle = _obstacles(skeleton, cloud, mask, outlier_factor)
+    if plane is not None:  # it stands for the points of the table
+        height = np.abs(points @ plane[:3] + plane[3]) / np.linalg.norm(plane[:3])
+        points = points[height > TABLE_SHARE * gripper.max_opening]
     _check_units(gripper, middle)
     accepted = _is_accepted(skeleton, accept)
     skeleton = skeleton if accepted else replace(skeleton, edges=np.empty((0, 2), int))
@@ -206,7 +211,7 @@ def _check_units(gripper: Gripper, middle: np.ndarray) -> None:
 def _is_accepted(skeleton: Skeleton, accept: Verdict | str) -> bool:
     """Whether the verdict is at least as good; if not, a warning says why."""
     verdict = skeleton.verdict
-    if verdict.is_at_least(Verdict(accept)):
+    if verdict >= accept:
         return True
     reason = "; ".join(it.text for it in skeleton.report.reasons if CODES[it.code] == verdict)
     advice = f"accept={verdict.value!r} takes it all the same"

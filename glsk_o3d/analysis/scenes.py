@@ -10,6 +10,8 @@ import numpy as np
 from ..api import PipelineChoice, chosen_pipeline
 from ..data.skeleton import Skeleton
 from ..errors import InvalidCloudError
+from ..geometry.vectors import finite_rows
+from ..interop.clouds import cloud_points, to_point_cloud
 from ..interop.packages import import_open3d
 from ..parameters import check_number
 
@@ -37,8 +39,8 @@ def scene_objects(
 
     Parameters
     ----------
-    cloud : open3d.geometry.PointCloud
-        Finite points.
+    cloud : open3d.geometry.PointCloud, open3d.t.geometry.PointCloud or (N, 3) array_like
+        Points that are not finite are of nothing.
     height : float
         Distance from the plane up to which a point is of it [cloud's units].
     gap : float
@@ -56,26 +58,33 @@ def scene_objects(
 
     Raises
     ------
-    InvalidParameterError
-        A length is not positive.
+    InvalidCloudError, InvalidParameterError
+        There are fewer than three finite points, or a length is not positive.
     """
     check_number("height", height, low=0, open_low=True)
     check_number("gap", gap, low=0, open_low=True)
     check_number("min_points", min_points, "int", low=4)
     run = chosen_pipeline(pipeline, {})
+    places = cloud_points(cloud)
+    finite = np.flatnonzero(finite_rows(places))
+    if len(finite) < 3:
+        raise InvalidCloudError(f"{len(finite)} of {len(places)} points are finite: three make a plane")
     import_open3d().utility.random.seed(0)
-    plane, of_plane = cloud.segment_plane(distance_threshold=height, ransac_n=3, num_iterations=500)
-    rows = np.setdiff1d(np.arange(len(cloud.points)), of_plane)
-    above = cloud.select_by_index(rows)
+    scene = to_point_cloud(places[finite])
+    plane, of_plane = scene.segment_plane(distance_threshold=height, ransac_n=3, num_iterations=500)
+    rows = np.setdiff1d(np.arange(len(finite)), of_plane)
+    if not len(rows):
+        return np.asarray(plane), []
+    above = scene.select_by_index(rows)
     label = np.array(above.cluster_dbscan(eps=gap, min_points=10), int)
     counts = np.bincount(label[label >= 0])
     objects = []
     for number in np.argsort(-counts, kind="stable"):
-        mask = np.zeros(len(cloud.points), bool)
-        mask[rows[label == number]] = True
+        mask = np.zeros(len(places), bool)
+        mask[finite[rows[label == number]]] = True
         if counts[number] >= min_points:
             try:
-                objects.append(SceneObject(mask, run(np.asarray(cloud.points)[mask])))
+                objects.append(SceneObject(mask, run(places[mask])))
             except InvalidCloudError:
                 continue
     return np.asarray(plane), objects

@@ -22,23 +22,37 @@ class Verdict(str, Enum):
     """Whether a skeleton can be relied on.
 
     Members are strings, from the best to the worst: ``"good"``, ``"doubtful"`` and ``"no curve skeleton"``, of what is
-    a sheet or a ball, or has no edges.
+    a sheet or a ball, or has no edges. A better one is greater.
 
     Examples
     --------
     >>> from glsk_o3d import samples, skeletonize
     >>> skeletonize(samples.torus(1000).points).verdict
     <Verdict.GOOD: 'good'>
+    >>> Verdict.GOOD > Verdict.DOUBTFUL, Verdict.DOUBTFUL >= "good"
+    (True, False)
     """
 
     GOOD = "good"
     DOUBTFUL = "doubtful"
     NO_CURVE_SKELETON = "no curve skeleton"
 
-    def is_at_least(self, other: Verdict) -> bool:
-        """Whether it is as good as another one, or better."""
-        order = list(Verdict)
-        return order.index(self) <= order.index(other)
+    @property
+    def _rank(self) -> int:
+        return -list(Verdict).index(self)
+
+    # by how good they are, and not by their letters
+    def __lt__(self, other: str) -> bool:
+        return self._rank < Verdict(other)._rank
+
+    def __le__(self, other: str) -> bool:
+        return self._rank <= Verdict(other)._rank
+
+    def __gt__(self, other: str) -> bool:
+        return self._rank > Verdict(other)._rank
+
+    def __ge__(self, other: str) -> bool:
+        return self._rank >= Verdict(other)._rank
 
 
 def as_verdict(value: Verdict | str | None) -> Verdict | None:
@@ -125,4 +139,4 @@ def reasons_of_score(score: float, decisions: Iterable[Decision]) -> tuple[Reaso
 
 def verdict_of(reasons: Iterable[Reason]) -> Verdict:
     """The worst verdict that a reason demands."""
-    return max((CODES[reason.code] for reason in reasons), key=list(Verdict).index, default=Verdict.GOOD)
+    return min((CODES[reason.code] for reason in reasons), default=Verdict.GOOD)

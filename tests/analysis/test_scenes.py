@@ -4,7 +4,7 @@ import numpy as np
 import open3d as o3d
 import pytest
 
-from glsk_o3d import InvalidParameterError, samples
+from glsk_o3d import InvalidCloudError, InvalidParameterError, samples
 from glsk_o3d.analysis import scene_objects
 
 
@@ -24,5 +24,12 @@ def test_things_on_a_table_have_masks_and_skeletons():
     assert [np.flatnonzero(thing.mask)[0] for thing in objects] == [5800, 0]
     for thing in objects:
         np.testing.assert_array_equal(thing.skeleton.points, points[thing.mask])
+    holes = np.where(np.arange(len(points))[:, None] % 50 == 0, np.nan, points)  # as in the image of a camera
+    again = scene_objects(holes, height=0.02, gap=0.12)[1]
+    for thing, other in zip(objects, again, strict=True):
+        np.testing.assert_array_equal(other.mask, thing.mask & np.isfinite(holes[:, 0]))
+    assert scene_objects(table, height=0.02, gap=0.12)[1] == []
     with pytest.raises(InvalidParameterError, match="gap"):
         scene_objects(cloud, height=0.02, gap=0)
+    with pytest.raises(InvalidCloudError, match="0 of 9 points are finite"):
+        scene_objects(np.full((9, 3), np.nan), height=0.02, gap=0.1)

@@ -16,7 +16,8 @@ def decision(about, probability):
 
 def test_verdicts_have_an_order():
     for (i, a), (j, b) in itertools.product(enumerate(Verdict), repeat=2):
-        assert a.is_at_least(b) == (i <= j)
+        assert (a >= b, a > b, a <= b, a < b) == (i <= j, i < j, i >= j, i > j)
+        assert (a >= b.value) == (i <= j)
     assert as_verdict("doubtful") is Verdict.DOUBTFUL
     assert as_verdict(None) is None
     with pytest.raises(InvalidParameterError, match="'good', 'doubtful'"):

@@ -84,7 +84,7 @@ def _skeletonize(task: Task, row: Row, messages: list[str]) -> None:
     tree = measures_of_grown(skeleton)
     facts = ({} if tree is None else tree.sums()) | summary(skeleton, 0.0)  # traced is a number of points
     row |= {k: None if isinstance(value, float) and not math.isfinite(value) else value for k, value in facts.items()}
-    if task.accept and not task.is_tile and not skeleton.verdict.is_at_least(task.accept):
+    if task.accept and not task.is_tile and skeleton.verdict < task.accept:
         why = "; ".join(reason.text for reason in skeleton.reasons)
         raise InvalidCloudError(f"the skeleton is not accepted: {skeleton.verdict.value}: {why}")
     for output in task.outputs:
