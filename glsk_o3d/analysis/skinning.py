@@ -47,7 +47,9 @@ def skin_weights(
     widest = 2 * BLEND**2 * np.fmax(radius**2, least)
     if surface is not None and len(forest.edges) * len(points) <= MOST_SURFACE:
         beyond = _distances_from_bones(surface, own, bones, ALONG_SURFACE * np.nanmax(radius, initial=0))
-        squared = np.maximum(squared, least + widest * (beyond / np.fmax(ALONG_SURFACE * radius, TINY)) ** 2)
+        farther = np.maximum(squared, least + widest * (beyond / np.fmax(ALONG_SURFACE * radius, TINY)) ** 2)
+        # where bones are shorter than the mesh is fine, none may have points of its own: then the surface says nothing
+        squared = np.where(farther.min(axis=1, keepdims=True) < least + widest, farther, squared)
     order = np.argsort(squared, axis=1, kind="stable")[:, : MOST_WEIGHTS + 1]
     bones, squared = (np.take_along_axis(values, order, axis=1) for values in (bones, squared))
     fifth = squared[:, MOST_WEIGHTS:].min(axis=1, initial=np.inf, keepdims=True)

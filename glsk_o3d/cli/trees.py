@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..data.skeleton import Skeleton
 
 PRINTED_MEASURES = (
-    *("height", "stem_diameter", "crown_base", "crown_area", "crown_volume"),
+    *("verdict", "height", "stem_diameter", "crown_base", "crown_area", "crown_volume"),
     *("length_with_traced", "length_without_traced", "volume_with_traced", "volume_without_traced"),
 )
 """The columns that people read of a table of trees."""
@@ -80,7 +80,7 @@ def tree(
     files = write_outputs(outputs, rows)
     if len(trees) == 1:
         grown = skeleton.with_facts(root=measures.root)
-        facts = {"skeleton": str(trees[0]), **asdict(measures)}
+        facts = {"skeleton": str(trees[0]), "verdict": skeleton.verdict.value, **asdict(measures)}
         print_result(facts, lambda: _print_tree(facts), files | write_outputs(of_one, grown))
         return
     print_result({"trees": rows}, lambda: _print_trees(rows), files)

@@ -24,6 +24,7 @@ from ..io.geometry import to_tubes
 from .figures import MOST_DRAWN_POINTS, counts, thinned
 
 MOST_LISTED_ROWS = 12  # of a table
+MOST_SLIDING = 1000  # vertices of a skeleton with a slider, which holds ten of them
 LIMB_STEPS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # of the slider
 EYE = dict(x=0.9, y=-1.5, z=0.7)  # fitted to the eye: in front, somewhat to the right and above
 HOVER = (
@@ -136,7 +137,7 @@ def traces(skeleton: Skeleton, points: np.ndarray) -> list[Any]:
 def sliders(skeleton: Skeleton, points: np.ndarray) -> list[dict[str, Any]]:
     """The slider of plotly that shows limbs from another probability on; none if that makes no difference."""
     steps, frame, seen = [], _frame(skeleton, points), set[int]()
-    for least in LIMB_STEPS:
+    for least in LIMB_STEPS if len(skeleton.vertices) <= MOST_SLIDING else ():
         other = with_limbs(skeleton, least)
         places, (style, *_) = _curves(other)
         curve = {name: [values] for name, values in _scaled(places, *frame).items()}

@@ -94,6 +94,25 @@ def test_weights_go_over_from_bone_to_bone_also_at_creases():
     assert (np.count_nonzero(dense, axis=1) > 1).mean() > 0.05
 
 
+def test_a_bone_without_points_of_its_own_still_moves_what_is_nearest_to_it():
+    """Bones may be shorter than the mesh is fine: then no distance along the surface is known."""
+
+    class Coarse:
+        def continued(self, vertex, *_):
+            return vertex
+
+        def distances(self, own, limit):
+            return np.full(len(own), np.inf)
+
+    bones = bare([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [(0, 1), (1, 2)], [0.2] * 3)
+    points = np.array([[0.4, 0.2, 0], [1.6, 0.2, 0]])
+    vertex = vertex_of_cloud(bones, points)[1]
+    for values, others in zip(
+        skin_weights(bones, points, vertex, Coarse()), skin_weights(bones, points, vertex), strict=True
+    ):
+        np.testing.assert_array_equal(values, others)
+
+
 def test_behind_a_joint_a_bone_that_points_away_moves_less():
     bones = bare([[-1, 0, 0], [0, 0, 0], [1, 0, 0], [0, 0, 1]], [(0, 1), (1, 2), (1, 3)], [0.2] * 4)
     dense = dense_weights(bones, np.array([[0, 0, -0.2], [0, 0.2, 0]]))
