@@ -298,7 +298,7 @@ def rods(monkeypatch):
     """Rods instead of the shapes of the benchmark, which take seconds; gives the names of those that are rods."""
     names = []
 
-    def shape(family, seed):
+    def shape(family, seed, *, steady=False):
         names.append(f"{family}_{seed}")
         return straight(family, seed)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from glsk_bench.clouds import VARIANTS, cloud, coverage
-from glsk_bench.scanning import depth_image, seen_cosines
+from glsk_bench.scanning import depth_image, mixed_image, seen_cosines
 from glsk_bench.shapes import Shape
 from glsk_bench.shapes.axis import Axis, joined
 from glsk_bench.shapes.curves import generator
@@ -25,6 +25,7 @@ FINGERPRINTS = {
     "depth2": "0b1d579a4a066bdf",
     "misreg": "ee9b329a110f654a",
     "lidar": "53f15c38965978d9",
+    "flying": "928b72c105c69e82",
 }
 """Of clouds, to four decimals."""
 
@@ -124,6 +125,37 @@ def test_depth_noise_is_along_the_ray_and_grows_at_grazing_angles(ball):
     assert 40 <= flying.sum() <= 60  # half a percent are, some of them less far
     assert np.median(cosine[flying]) < 0.5 < np.median(cosine)  # beside the rim
     assert error[flying].max() < 0.2
+
+
+@pytest.mark.parametrize("share", [0.02, 0.08])
+def test_mixed_pixels_hang_between_the_rim_and_the_wall(share, ball):
+    eye = np.array([0, -2.2, 0])
+    points = mixed_image(ball, eye, 2000, generator("mixed", 0), share, 0.1)
+    wall = 0.1 + ball.points[:, 1].max()
+    step = (wall + 2.2 - np.linalg.norm(ball.points - eye, axis=1).min()) / 500
+    depth = (points[:, 1] + 2.2) / step
+    np.testing.assert_allclose(depth, np.round(depth), atol=1e-9)
+    off = np.linalg.norm(points, axis=1) - 0.5
+    mixed = off > 0.02
+    assert 0.2 * share < mixed.mean() <= share  # others hang near the rim, or between places of the ball
+    assert points[mixed, 1].min() > -0.2
+    assert points[mixed, 1].max() < wall
+    ray = (points - eye) / np.linalg.norm(points - eye, axis=1)[:, None]
+    aside = np.sqrt(eye @ eye - (ray @ eye) ** 2)
+    np.testing.assert_allclose(aside[mixed], 0.5, atol=0.05)  # at the outline
+
+
+def test_mixed_pixels_form_veils(ball):
+    points = mixed_image(ball, np.array([0, -2.2, 0]), 2000, generator("mixed", 0), 0.05, 0.1)
+    mixed = points[np.linalg.norm(points, axis=1) > 0.52]
+    angle = np.sort(np.arctan2(mixed[:, 2], mixed[:, 0]))
+    gaps = np.diff(angle)
+    assert gaps.max() > 5 * 2 * np.pi / len(mixed)  # stretches of the outline have none
+    assert np.median(gaps) < 0.7 * 2 * np.pi / len(mixed)
+
+
+def test_a_single_point_before_a_wall(drawn):
+    assert cloud(drawn("handles", 0), "flying", 1).shape == (1, 3)
 
 
 def tubes(*offsets):

@@ -102,6 +102,14 @@ def test_things_and_what_is_known_of_them(tmp_path):
     assert "half_width" in json.loads((tmp_path / INDEX_NAME).read_text())["explained"]["truth/SHAPE.npz"]
 
 
+def test_toys_and_rings_are_what_is_known(tmp_path):
+    variants = ["clean", "scan2", "flying"]
+    made = make(tmp_path, "v3", families=["toys", "rings"], seeds=[101], variants=variants, jobs=1)
+    same = [cloud["sameness"] for told in made.shapes.values() for cloud in told["clouds"].values()]
+    assert len(same) == 6
+    assert set(same) <= {"bits", "rounding"}
+
+
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [

@@ -150,6 +150,28 @@ class TestRepeat:
         with pytest.raises(FileNotFoundError, match="has no true axis of box: 'glsk benchmark repeat'"):
             score_answers(made, tmp_path / "answers")
 
+    def test_float32_is_compared_with_float64(self, meshes, tmp_path):
+        made = sample(tmp_path / "made", meshes, draws=2, n=800, double=True)
+        assert [cloud.name for cloud in made.clouds][:3] == ["box_0", "box_float64", "box_1"]
+        exact, rounded = (np.asarray(read_cloud(cloud.path).points) for cloud in (made.clouds[1], made.clouds[0]))
+        assert (exact != rounded).any()
+        np.testing.assert_array_equal(exact.astype(np.float32), rounded.astype(np.float32))
+        with pytest.raises(InvalidParameterError, match="has other clouds of box"):
+            sample(tmp_path / "made", meshes, draws=2, n=800)
+        assert run(made, tmp_path / "answers", jobs=2).failed == 0
+        found = repeat(tmp_path / "made", tmp_path / "answers")
+        box = found.rows[0]
+        assert box["draws"] == len(box["found"]) == 2
+        assert box["float32"]["moved"] < 1e-3 < box["moved"]
+        assert box["float32"]["agree"] is True
+        assert found.means()["float32"]["agree"] == 1
+        assert found.markdown().splitlines()[2].endswith("| failures | float32 moved | float32 agrees |")
+        next((tmp_path / "answers").glob("box_float64.*")).unlink()
+        found = repeat(tmp_path / "made", tmp_path / "answers")
+        assert found.rows[0]["float32"] == {"moved": None, "agree": False}
+        assert found.means()["float32"]["agree"] == 0.5
+        assert found.means()["failures"] == 0  # of the draws
+
     def test_failures_of_every_kind(self, small, perfect):
         """Of any folder with several clouds of a shape."""
         alone = small.shapes.pop("trees_101")  # of which one cloud is scored

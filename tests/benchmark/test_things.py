@@ -1,5 +1,6 @@
 """Things: distances and areas in closed form, what is known of their axes, what is refused, and the same for ever."""
 
+import networkx as nx
 import numpy as np
 import pytest
 from glsk_bench.clouds import cloud, coverage
@@ -8,6 +9,7 @@ from glsk_bench.shapes.curves import generator
 from glsk_bench.shapes.things.fairness import fault_of
 from glsk_bench.shapes.things.field import distance, surface_of
 from glsk_bench.shapes.things.lines import X, Y
+from glsk_bench.shapes.things.rings import _block, _Ring
 from glsk_bench.shapes.things.section import half_axes, section_radius, unit_area
 from glsk_bench.shapes.things.solid import ROUND_ENDS, Solid
 from glsk_bench.truths import THING_ARRAYS
@@ -15,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from glsk_o3d.samples.capsules import capsule_distance
 
-EACH = [(family, seed) for family in FAMILIES["v2"] for seed in (0, 1)]
+EACH = [(family, seed) for family in FAMILIES["v3"] for seed in (0, 1)]
 FINGERPRINTS = {
     "prisms": ["fb41f81cbe425ceb", "b2d82c30aa6c9da3", "08ec40c659437e7d", "975a58e20b502098"],
     "implements": ["4126e85541819406", "d4e4924ec0f80929", "9dae3835291f106b", "51207185fbb7ab91"],
@@ -23,11 +25,13 @@ FINGERPRINTS = {
     "plates": ["9ed078b79dd48475", "1c2e2fdf821ae43b", "9a543c09c2dbcb28", "475a94c121430db8"],
     "blades": ["076505c426d87059", "9ebd5c97c653d376", "809764596e689506", "6ebe92f4f30b54c3"],
     "mugs": ["3a2fb2847c72ba3b", "c59d671510e808be", "906d30c225ddf9f6", "1590655500b39644"],
+    "toys": ["8c535af97068cba9", "00c5e13fc92f09e2", "a3527dc086158b1f", "d2e5869cf9528f51"],
+    "rings": ["64c88d4d4854df5b", "6f56046f6a49f7e3", "2d549ff6ebf5958d", "b9d43f855b9418e4"],
 }
 """Of shapes with seed 0 and of three of their clouds, coordinates to four decimals."""
 
 
-@pytest.mark.parametrize("family", FAMILIES["v2"])
+@pytest.mark.parametrize("family", FAMILIES["v3"])
 def test_fingerprints(family, drawn, fingerprint):
     one = drawn(family, 0)
     truth = (one.nodes, one.radii, one.edges, one.points, one.normals, *(getattr(one, name) for name in THING_ARRAYS))
@@ -84,7 +88,9 @@ def test_the_axis_ends_half_a_radius_inside_of_flat_faces(family, seed, drawn):
         )  # that of the face is less in a limb that tapers
 
 
-@pytest.mark.parametrize(("family", "seed"), [("animals", 0), ("animals", 2), ("blades", 1), ("blades", 3)])
+@pytest.mark.parametrize(
+    ("family", "seed"), [("animals", 0), ("animals", 2), ("blades", 1), ("blades", 3), ("toys", 1)]
+)
 def test_a_mirror_is_one(family, seed, drawn):
     one = drawn(family, seed)
     place, normal = one.mirror
@@ -93,6 +99,51 @@ def test_a_mirror_is_one(family, seed, drawn):
     assert cKDTree(one.nodes).query(nodes)[0].max() < 1e-9
     assert cKDTree(one.points).query(points)[0].max() < 5 * one.spacing
     assert drawn("animals", 1).mirror.shape == (0, 3)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_toys_are_stout(seed, drawn):
+    one = drawn("toys", seed)
+    degree = np.bincount(one.edges.ravel())
+    assert one.facts["cycle_rank"] == 0
+    assert (degree == 1).sum() >= 5
+    body = one.half_width.max()
+    assert body > 0.13  # of the diagonal
+    assert (one.radii[degree == 1] > 0.13 * body).all()  # ears are the thinnest: of the head, which is thinner itself
+
+
+@pytest.mark.parametrize("seed", [101, 104, 108, 110])  # a washer, a roll of tape and two nuts
+def test_holes_of_rings_are_no_wider_than_bars(seed, drawn):
+    one = drawn("rings", seed)
+    middle = one.nodes.mean(axis=0)
+    size = np.linalg.norm(one.nodes - middle, axis=1)
+    hole = cKDTree(one.points).query(middle)[0]
+    assert one.facts["cycle_rank"] == 1
+    assert not inside(one, middle[None])[0]
+    assert (hole / (size - hole)).min() > 0.35
+    assert (hole / (size - hole)).max() < 1.2
+
+
+def block(counts):
+    """A block with so many holes, as it is drawn."""
+    for seed in range(100):
+        ring = _Ring(Solid(), np.random.default_rng(seed), 1.0, 10.0)
+        _block(ring)
+        spots = np.array([void.places[0, :2] for void in ring.solid.voids]).round(9)
+        if tuple(len(np.unique(column)) for column in spots.T) == counts:
+            return ring.solid
+    raise AssertionError
+
+
+@pytest.mark.parametrize(("counts", "junctions"), [((1, 1), 0), ((3, 1), 4), ((2, 2), 5)])
+def test_the_axis_of_a_block_has_a_loop_for_each_hole(counts, junctions):
+    solid = block(counts)
+    graph = nx.Graph(solid.links)
+    assert graph.number_of_edges() - len(graph) + 1 == np.prod(counts)
+    assert sum(degree > 2 for _, degree in graph.degree) == junctions
+    for void in solid.voids:
+        middle = void.places.mean(axis=0)
+        assert np.linalg.norm(solid.nodes - middle, axis=1).min() > void.a[0] + 0.5
 
 
 # ----------------------------------------------------------------------------------------------------- sections, sweeps
@@ -125,6 +176,18 @@ def test_distances_to_a_rod(steps, blend):
     ahead, _ = distance(rod(ROUND_ENDS, places, blend=blend), points + step, 1.0)
     smooth = found > -0.099
     np.testing.assert_allclose((ahead - found)[smooth], (gradients @ step)[smooth], atol=1e-9)
+
+
+def test_roundings_decide_nothing_on_the_edges_of_a_flat_end():
+    angle, rng = np.linspace(0, 2 * np.pi, 500), np.random.default_rng(0)
+    rim = np.column_stack([np.ones(500), 0.1 * np.cos(angle), 0.1 * np.sin(angle)])
+    solid = rod(("flat", "flat"), blend=0.1)
+    solid.edge = 1e-9
+    _, gradients = distance(solid, rim + rng.uniform(-1e-12, 1e-12, rim.shape), 0.1)
+    np.testing.assert_allclose(gradients, np.tile(X, (500, 1)), atol=1e-12)
+    solid.edge = 0.0  # as in versions before v3
+    _, gradients = distance(solid, rim + rng.uniform(-1e-12, 1e-12, rim.shape), 0.1)
+    assert 0.1 < gradients[:, 0].mean() < 0.9
 
 
 @pytest.mark.parametrize(

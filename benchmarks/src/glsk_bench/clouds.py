@@ -14,7 +14,7 @@ from glsk_o3d.geometry.groups import component_labels
 from glsk_o3d.geometry.vectors import norm
 from glsk_o3d.samples.capsules import checked_generator
 
-from .scanning import camera_places, depth_image, lidar_scan, seen_cosines
+from .scanning import MIXED_SHARE, WALL_BEHIND, camera_places, depth_image, lidar_scan, mixed_image, seen_cosines
 from .shapes import Shape, Thing
 from .shapes.axis import subdivided
 from .shapes.curves import direction, generator
@@ -40,7 +40,8 @@ def cloud(shape: Shape, variant: str, n: int = 4096, seed: int = 0) -> np.ndarra
         One of `VARIANTS`: ``clean``, uniform by area; ``density``, ten times denser at one end; ``holes``, four balls
         cut out; ``outliers``, 1 % anywhere in a somewhat larger box, last; ``noise05``, ``noise1``, ``noise2``,
         Gaussian of 0.5, 1 and 2 % of the diagonal; ``scan2``, as two cameras see it; ``depth2``, two depth cameras with
-        their noise; ``misreg``, three views that do not fit; ``lidar``, scan lines of three laser scanners.
+        their noise; ``misreg``, three views that do not fit; ``lidar``, scan lines of three laser scanners;
+        ``flying``, two depth cameras before a wall, with mixed pixels at edges.
     n : int
         Number of points, at most a quarter of the shape's `points`: not all of those are seen by scanners.
     seed : int
@@ -145,6 +146,15 @@ def _views(cameras, scan, shape, n, rng, look):
     return np.vstack([scan(shape, eye, count, rng) for eye, count in places if count])
 
 
+def _flying(shape, n, rng, look):
+    """What two depth cameras see before a wall, each with another share of mixed pixels."""
+    views = []
+    for eye, count in zip(camera_places(look, 2), _shares(n, 2), strict=True):
+        share, wall = look.uniform(*MIXED_SHARE), look.uniform(*WALL_BEHIND)
+        views += [mixed_image(shape, eye, count, rng, share, wall)] if count else []
+    return np.vstack(views)
+
+
 def _shares(n, parts):
     """Whole numbers, as equal as can be, that add up to n."""
     return np.diff(np.linspace(0, n, parts + 1).round().astype(int))
@@ -162,6 +172,7 @@ DRAWN_FOR: dict[str, Callable] = {
     "depth2": partial(_views, 2, depth_image),
     "misreg": _misreg,
     "lidar": partial(_views, 3, lidar_scan),
+    "flying": _flying,
 }
 """The functions that draw, by variant."""
 VARIANTS = tuple(DRAWN_FOR)

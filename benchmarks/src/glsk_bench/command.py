@@ -181,6 +181,9 @@ def sample(
     draws: Annotated[int, typer.Option(metavar="N", min=2, help="Clouds of each object.")] = 5,
     points: Annotated[int, typer.Option(metavar="N", min=1, help="Of each cloud.")] = 4096,
     noise: Annotated[float, typer.Option(metavar="SHARE", min=0, help="Of the diagonal, on every coordinate.")] = 0.0,
+    double: Annotated[
+        bool, typer.Option("--float64", help="The first one also in float64, as OBJECT_float64.")
+    ] = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -191,7 +194,13 @@ def sample(
 
         with progress(remaining=True) as update:
             update("reading")
-            options: dict[str, Any] = {"version": version, "draws": draws, "n": points, "noise": noise}
+            options: dict[str, Any] = {
+                "version": version,
+                "draws": draws,
+                "n": points,
+                "noise": noise,
+                "double": double,
+            }
             made = sample_objects(folder, meshes, **options, on_object=update)
         told = {"folder": str(folder), "objects": len(made.shapes), "clouds": len(made.clouds)}
         _tell(told, told, as_json, quiet)

@@ -151,7 +151,8 @@ def _make_shape(folder: Path, name: str, family: str, seed: int, variants: Seque
     from .clouds import cloud, coverage
     from .shapes import shape
 
-    asked, known, drawn = versions.version(name), versions.fingerprints(name), shape(family, seed)
+    asked, known = versions.version(name), versions.fingerprints(name)
+    drawn = shape(family, seed, steady=asked.steady)
     truth = f"truth/{drawn.name}.npz"
     write_axis(folder / truth, drawn)
     clouds, not_made = {}, {}

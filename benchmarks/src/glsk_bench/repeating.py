@@ -26,6 +26,8 @@ from .table import markdown_lines
 PLACES = ("ends", "junctions", "elsewhere", "limbs")
 """Where skeletons are apart: near ends, near junctions, elsewhere; and limbs that the other does not have."""
 NEAR_PLACE = 2.0  # fitted: radii around an end or a junction, and from the other skeleton where that has no such limb
+DOUBLE, SINGLE = "float64", "0"
+"""The variants of an object that are one cloud: in float64, and as it is written otherwise, in float32."""
 _SHARES = ("agree", "loops", "ends")
 _KNOWN = ("components", "loops", "ends")
 
@@ -130,6 +132,8 @@ class Repeat:
         Of the program.
     rows : list of dict
         For each object its name as ``object``, its ``radius`` and how many ``draws`` there are, and what `spread` says.
+        ``float32`` is None, or of one cloud in float64 and in float32: ``moved``, and ``agree``, whether both skeletons
+        have the same components, loops and leaves.
 
     Examples
     --------
@@ -148,8 +152,8 @@ class Repeat:
         -------
         dict
             How many ``objects``, ``draws`` and ``failures``; the mean and the ``median`` of ``moved``; the means of the
-            shares, and of ``where``; and the share of ``hooks`` of all ends that are long enough. None where nothing is
-            known.
+            shares, and of ``where``; the share of ``hooks`` of all ends that are long enough; and of ``float32`` the
+            mean of ``moved`` and the share that does ``agree``. None where nothing is known.
         """
         moved = [row["moved"] for row in self.rows if row["moved"] is not None]
         where = [row["where"] for row in self.rows if row["where"] is not None]
@@ -163,7 +167,16 @@ class Repeat:
             **{name: fmean(values) if values else None for name, values in shares.items()},
             "hooks": sum(row["hooks"] for row in self.rows) / tips if tips else None,
             "where": {name: fmean(each[name] for each in where) for name in PLACES} if where else None,
+            "float32": self._float32(),
         }
+
+    def _float32(self) -> dict[str, float | None] | None:
+        """The means over all objects with a cloud in float64."""
+        pairs = [row["float32"] for row in self.rows if row.get("float32")]
+        if not pairs:
+            return None
+        moved = [each["moved"] for each in pairs if each["moved"] is not None]
+        return {"moved": fmean(moved) if moved else None, "agree": fmean(each["agree"] for each in pairs)}
 
     def as_dict(self) -> dict[str, Any]:
         """All of it, as JSON holds it.
@@ -192,20 +205,29 @@ class Repeat:
         """
         heads = ["object", "moved", "near ends", "near junctions", "elsewhere", "limbs"]
         heads += ["agree", "right loops", "right ends", "hooks", "failures"]
-        lines = []
+        lines, means = [], self.means()
+        double = means["float32"] is not None
+        heads += ["float32 moved", "float32 agrees"] if double else []
         for row in self.rows:
             hooks = f"{row['hooks']} of {row['tips']}"
-            lines.append([row["object"], *_cells(row), hooks, f"{row['failures']} of {row['draws']}"])
-        means = self.means()
-        hooks = "-" if means["hooks"] is None else f"{means['hooks']:.2f}"
-        lines.append(["mean", *_cells(means), hooks, f"{means['failures']} of {means['draws']}"])
+            cells = [row["object"], *_cells(row), hooks, f"{row['failures']} of {row['draws']}"]
+            lines.append(cells + (_pair(row.get("float32")) if double else []))
+        cells = ["mean", *_cells(means), _number(means["hooks"]), f"{means['failures']} of {means['draws']}"]
+        lines.append(cells + (_pair(means["float32"]) if double else []))
         return markdown_lines(f"{self.name}: answers to several clouds of each object", heads, lines) + "\n"
 
 
 def _cells(row: dict[str, Any]) -> list[str]:
     where = row["where"] or dict.fromkeys(PLACES)
-    values = [row["moved"], *where.values(), *(row[name] for name in _SHARES)]
-    return ["-" if value is None else f"{value:.2f}" for value in values]
+    return list(map(_number, [row["moved"], *where.values(), *(row[name] for name in _SHARES)]))
+
+
+def _pair(found: dict[str, Any] | None) -> list[str]:
+    return [_number(found[name] if found else None) for name in ("moved", "agree")]
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f}"
 
 
 def repeat(
@@ -220,7 +242,8 @@ def repeat(
     Parameters
     ----------
     folder : BenchmarkFolder or path-like
-        With several clouds of each object, as `sample` makes them; or any other, whose variants are then compared.
+        With several clouds of each object, as `sample` makes them; or any other, whose variants are then compared. A
+        cloud in float64 is compared with the first one alone.
     answers : path-like
         As for `score_answers`. What is missing or unreadable counts as a failure.
     name : str, optional
@@ -275,12 +298,23 @@ def repeat(
             check_size(radius, answer.vertices, answer.edges)
             return answer
 
-        found = [given.use(cloud, checked) for cloud in clouds]
-        skeletons = [None if isinstance(each, str) else each for each in found]
-        rows.append({"object": shape, "draws": len(clouds), "radius": radius, **spread(skeletons, radius, **known)})
+        found = {cloud.variant: given.use(cloud, checked) for cloud in clouds}
+        skeletons = {variant: None if isinstance(each, str) else each for variant, each in found.items()}
+        draws = [each for variant, each in skeletons.items() if variant != DOUBLE]
+        row = {"object": shape, "draws": len(draws), "radius": radius, **spread(draws, radius, **known)}
+        row["float32"] = _float32(skeletons, radius)
+        rows.append(row)
         if on_object is not None:
             on_object(shape, done, len(objects))
     return Repeat(given.made.name, name or given.name, rows)
+
+
+def _float32(skeletons: dict[str, Skeleton | None], radius: float) -> dict[str, Any] | None:
+    """How far the skeletons of one cloud in float64 and in float32 are apart, and whether they have the same graph."""
+    if not {DOUBLE, SINGLE} <= skeletons.keys():
+        return None
+    found = spread([skeletons[DOUBLE], skeletons[SINGLE]], radius)
+    return {"moved": found["moved"], "agree": found["agree"] == 1}
 
 
 def _known(made: BenchmarkFolder, shape: str) -> tuple[float, dict[str, Any]]:

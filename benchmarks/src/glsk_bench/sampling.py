@@ -22,7 +22,7 @@ from glsk_o3d.recipes.catalogue import named_pipeline
 from . import versions
 from .folders import BenchmarkFolder, begun, write_axis, write_points
 from .own import PLAIN, check_names, stored_points
-from .repeating import of_axis
+from .repeating import DOUBLE, of_axis
 
 MANIFEST_NAME = "manifest.json"
 FIRST_DRAW = 100  # fitted: the seed of the first cloud of a mesh; any would do
@@ -47,6 +47,7 @@ def sample(
     draws: int = 5,
     n: int = 4096,
     noise: float = 0.0,
+    double: bool = False,
     on_object: Callable[[str, int, int], object] | None = None,
 ) -> BenchmarkFolder:
     """Draw several clouds of each object, so that `run` and `repeat` say how much of a skeleton is chance.
@@ -67,6 +68,9 @@ def sample(
         Clouds of each object, 2 or more, and points of each.
     noise : float
         Standard deviation of Gaussian noise on every coordinate, as a share of the bounding box's diagonal.
+    double : bool
+        Whether there is also the first cloud of each object in float64, OBJECT_float64, so that `repeat` says whether
+        rounding to float32 changes its skeleton.
     on_object : callable, optional
         Called with the name of each object that is done, how many are, and of how many.
 
@@ -100,7 +104,7 @@ def sample(
     check_number("noise", noise, low=0)
     objects = _things(version) if meshes is None else _meshes(Path(meshes))
     made = begun(Path(folder), versions.OWN)
-    facts = {"draws": draws, "points": n, "noise": noise}
+    facts = {"draws": draws, "points": n, "noise": noise, **({"double": True} if double else {})}
     for done, (name, make) in enumerate(objects.items(), 1):
         told = made.shapes.get(name)
         if told is not None and told.get("sampled") != facts:
@@ -120,13 +124,15 @@ def _add(made: BenchmarkFolder, it: _Object, facts: Mapping[str, Any]) -> Benchm
         size = facts["noise"] * np.linalg.norm(np.ptp(cloud, axis=0)) if it.axis is None else facts["noise"]
         noise = np.random.default_rng(draw).normal(0, size, cloud.shape)
         points[str(draw)] = stored_points(f"{it.name}_{draw}", cloud + noise)
+        if draw == 0 and facts.get("double"):
+            points[DOUBLE] = cloud + noise
     check_names(made, it.name, points)
     told = {
         **{"family": it.family, "truth": f"truth/{it.name}.npz", "fingerprint": f"{it.family} {it.name}"},
         **{"sampled": dict(facts), **it.known, "clouds": {}},
     }
     if told["radius"] is None:
-        told["radius"] = _usual_radius(it.name, points.values())
+        told["radius"] = _usual_radius(it.name, [each for draw, each in points.items() if draw != DOUBLE])
     if it.axis is not None:
         write_axis(made.path / told["truth"], it.axis)
     for draw, cloud in points.items():
@@ -164,7 +170,7 @@ def _things(version: str) -> dict[str, Callable[[], _Object]]:
         from .clouds import cloud
         from .shapes import shape
 
-        drawn = shape(family, asked.seeds[0])
+        drawn = shape(family, asked.seeds[0], steady=asked.steady)
         radius, known = of_axis(drawn)
         return _Object(
             drawn.name, family, lambda n, draw: cloud(drawn, "clean", n, draw), known | {"radius": radius}, drawn

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import maximum_filter, minimum_filter
+from scipy.ndimage import gaussian_filter, maximum_filter, minimum_filter
 
 from glsk_o3d.errors import InvalidParameterError
 from glsk_o3d.geometry.vectors import dot, norm, unit
@@ -28,6 +28,12 @@ NO_SURFACE = 9.0  # range of a ray that hits nothing
 EDGE_STEP = 0.04  # what is farther behind is background
 DEPTH_NOISE, LIDAR_NOISE = 0.0015, 0.002  # standard deviation along the ray; of depth where surface faces the camera
 FLYING_SHARE, FLYING_REACH = 0.005, 0.2  # points between foreground and background, and how far behind they are at most
+WALL_BEHIND = (0.03, 0.25)  # of the wall, behind the farthest place of the shape, in depth
+MIXED_SHARE = (0.02, 0.08)  # of the points of a camera before a wall
+DEPTH_STEPS = 500  # of its range, from the nearest place to the wall
+VEIL_PIXELS, VEIL_NOISE = 2, 0.5  # how far along an edge mixed pixels are alike, and how much each is another
+VEIL_LEAST = 1e-12  # derived: keeps what divides by it finite where there is one pixel
+LEAST_COVERED = 0.05  # of a mixed pixel, by the front and by the back
 LIDAR_CELL = (0.5, 2.0)  # sides of a cell of its grid, in those of a square as large: dense along, sparse across
 
 
@@ -38,6 +44,18 @@ class Rays(NamedTuple):
     ranges: np.ndarray  # (m,)
     cosines: np.ndarray  # of the angle between ray and normal
     behind: np.ndarray  # the range beside the ray where that is much longer, else NaN
+    pixels: np.ndarray  # (m, 2), the cell of the grid
+
+    def rows(self, picked: np.ndarray) -> Rays:
+        """Some of the rays."""
+        return Rays(*(column[picked] for column in self))
+
+    @property
+    def image(self) -> np.ndarray:
+        """The ranges of the cells of the grid, infinite where nothing is hit, as all around."""
+        image = np.full(self.pixels.max(axis=0) + 2, np.inf)
+        image[tuple(self.pixels.T)] = self.ranges
+        return image
 
 
 def camera_places(rng: np.random.Generator, count: int) -> np.ndarray:
@@ -109,7 +127,8 @@ def cast(shape: Shape, eye: np.ndarray, n: int, sides: tuple[float, float], rng:
     rays = unit(np.column_stack([middle, np.ones(len(hit))]) @ axes)
     ranges = _met(rays, points[hit] - eye, normals[hit], distance[hit], TANGENT_REACH * shape.spacing)
     cosines = np.maximum(-dot(rays, normals[hit]), RAY_COSINE)
-    return Rays(rays, ranges, cosines, _background(pixel, hit, ranges))
+    found = Rays(rays, ranges, cosines, ranges, pixel[hit])
+    return found._replace(behind=_background(found))
 
 
 def _grid(image, pitch, phase):
@@ -133,19 +152,17 @@ def _met(rays, offset, normals, distance, reach):
     return np.clip(ranges, distance - reach, distance + reach)
 
 
-def _background(pixel, hit, ranges):
+def _background(rays):
     """The longest range in the cells around, where that is a step behind; else NaN."""
-    image = np.full(pixel.max(axis=0) + 2, np.inf)
-    image[tuple(pixel[hit].T)] = ranges
-    behind = maximum_filter(np.where(np.isinf(image), NO_SURFACE, image), 3)[tuple(pixel[hit].T)]
-    return np.where(behind > ranges + EDGE_STEP, behind, np.nan)
+    image = rays.image
+    behind = maximum_filter(np.where(np.isinf(image), NO_SURFACE, image), 3)[tuple(rays.pixels.T)]
+    return np.where(behind > rays.ranges + EDGE_STEP, behind, np.nan)
 
 
 def depth_image(shape: Shape, eye: np.ndarray, n: int, rng: np.random.Generator) -> np.ndarray:
     """Draw n points of a depth camera, (n, 3) float array: noise grows at grazing angles, points fly at edges."""
     rays = cast(shape, eye, n, (1, 1), rng)
-    taken = rng.permutation(len(rays.ranges))[:n]
-    rays = Rays(*(column[taken] for column in rays))
+    rays = rays.rows(rng.permutation(len(rays.ranges))[:n])
     far = rays.ranges + rng.normal(0, DEPTH_NOISE, n) / rays.cosines
     edge = np.flatnonzero(np.isfinite(rays.behind))
     fly = rng.choice(edge, min(len(edge), round(FLYING_SHARE * n)), replace=False)
@@ -153,6 +170,64 @@ def depth_image(shape: Shape, eye: np.ndarray, n: int, rng: np.random.Generator)
     room = np.minimum(rays.behind[fly], rays.ranges[fly] + FLYING_REACH) - rays.ranges[fly]
     far[fly] = rays.ranges[fly] + share * room
     return eye + rays.directions * far[:, None]
+
+
+def mixed_image(
+    shape: Shape, eye: np.ndarray, n: int, rng: np.random.Generator, share: float, wall: float
+) -> np.ndarray:
+    """Draw n points of a depth camera before a wall so far behind the shape, a share of them mixed, (n, 3) float array.
+
+    A mixed pixel looks at an edge of depth, inside the outline of the shape or just beside it. Its range is the mean of
+    those of both sides by the light that each returns: by its part of the pixel over the square of its range.
+    Neighbours are mixed alike, so that they form veils. Noise grows with the square of the range and at grazing angles,
+    and depth has steps.
+    """
+    rays = cast(shape, eye, n, (1, 1), rng)
+    _, distance, axes = _projected(shape.points, eye)
+    depth = (shape.points - eye) @ axes[2]
+    wall += depth.max()
+    edges = _edges(rays, axes, wall)
+    order, mixture = (_veils(edges.pixels, rays.image.shape, rng) for _ in range(2))
+    picked = np.flatnonzero(order < round(share * n))
+    mixed = edges.rows(picked)
+    covered = LEAST_COVERED + (1 - 2 * LEAST_COVERED) * (mixture[picked] + 0.5) / len(order)
+    front, back = covered / mixed.ranges**2, (1 - covered) / mixed.behind**2
+    mixed = mixed._replace(ranges=(front * mixed.ranges + back * mixed.behind) / (front + back))
+    plain = np.ones(len(rays.ranges), bool)
+    inside = np.flatnonzero(np.isfinite(rays.behind))  # the first of the edges
+    plain[inside[picked[picked < len(inside)]]] = False
+    taken = rng.permutation(np.flatnonzero(plain))[: n - len(picked)]
+    rays = Rays(*map(np.concatenate, zip(rays.rows(taken), mixed, strict=True)))
+    ranges = rays.ranges + rng.normal(0, DEPTH_NOISE, n) * (rays.ranges / CAMERA_DISTANCE) ** 2 / rays.cosines
+    ahead = rays.directions @ axes[2]
+    step = (wall - distance.min()) / DEPTH_STEPS
+    return eye + rays.directions * (np.round(ranges * ahead / step) * step / ahead)[:, None]
+
+
+def _edges(rays, axes, wall):
+    """Rays at edges of depth: those that hit, and then those just beside the outline.
+
+    Their ranges are those of the front. Behind it is the shape, or else a wall at this depth.
+    """
+    image, inside = rays.image, rays.rows(np.flatnonzero(np.isfinite(rays.behind)))
+    nearest = minimum_filter(image, 3)
+    beside = np.argwhere(np.isinf(image) & np.isfinite(nearest))
+    local = rays.directions @ axes.T
+    tangents = local[:, :2] / local[:, 2:]
+    pitch = np.ptp(tangents, axis=0) / np.maximum(np.ptp(rays.pixels, axis=0), 1)
+    tangents = tangents[0] + (beside - rays.pixels[0]) * pitch
+    directions = np.vstack([inside.directions, unit(np.column_stack([tangents, np.ones(len(beside))]) @ axes)])
+    front = np.concatenate([inside.ranges, nearest[tuple(beside.T)]])
+    back = np.concatenate([inside.behind, np.full(len(beside), NO_SURFACE)])
+    back = np.minimum(back, wall / (directions @ axes[2]))
+    return Rays(directions, front, np.ones(len(front)), back, np.vstack([inside.pixels, beside]))
+
+
+def _veils(pixels, shape, rng):
+    """Random ranks of pixels, such that those of neighbours are alike."""
+    smooth = gaussian_filter(rng.normal(size=shape), VEIL_PIXELS)[tuple(pixels.T)]
+    smooth = smooth / max(smooth.std(), VEIL_LEAST) + VEIL_NOISE * rng.normal(size=len(pixels))
+    return np.argsort(np.argsort(smooth, kind="stable"), kind="stable")
 
 
 def lidar_scan(shape: Shape, eye: np.ndarray, n: int, rng: np.random.Generator) -> np.ndarray:

@@ -34,6 +34,7 @@ class Version:
     least_coverage: float  # clouds with less are not scored: nobody can be asked for what they do not show
     things: bool = False  # whether its shapes are things, of whose truth more is known
     left_out: tuple[str, ...] = ()  # clouds that cannot be made: scanners see too little of the shape
+    steady: bool = False  # whether normals on edges of animals do not depend on roundings
 
     def variants_of(self, shape: str) -> tuple[str, ...]:
         """The variants that there are of a shape."""
@@ -60,7 +61,14 @@ _V2 = replace(
     things=True,
     left_out=("plates_110_depth2",),
 )
-VERSIONS = {each.name: each for each in (_V1, _V2)}
+_V3 = replace(
+    _V2,
+    name="v3",
+    families=(*_V2.families, "toys", "rings"),
+    variants=(*_V2.variants, "flying"),
+    steady=True,
+)
+VERSIONS = {each.name: each for each in (_V1, _V2, _V3)}
 """All versions by name. One that has been published is never changed."""
 OWN = "own"
 """What stands for the version where clouds and axes are somebody's own."""

@@ -1,4 +1,4 @@
-"""Random shapes with exactly known axes: twelve families, as many shapes as there are seeds.
+"""Random shapes with exactly known axes: fourteen families, as many shapes as there are seeds.
 
 Examples
 --------
@@ -11,6 +11,8 @@ Shape('groups_0': 2 components, 0 loops, 4 leaves)
 ('prisms', 'implements', 'animals', 'plates', 'blades', 'mugs')
 >>> shape("plates", 0)
 Shape('plates_0': 1 component, 4 loops, 0 leaves)
+>>> FAMILIES["v3"][6:]
+('toys', 'rings')
 """
 
 from .drawing import FAMILIES, Shape, Thing, shape

@@ -28,19 +28,27 @@ from .things.implements import implements
 from .things.mugs import mugs
 from .things.plates import plates
 from .things.prisms import prisms
+from .things.rings import rings
 from .things.solid import Solid
+from .things.toys import toys
 from .trees import trees
 from .tubes import tubes
 
 ROUND_CONES = (tubes, trees, frames, figures, handles, groups)
-THINGS = (prisms, implements, animals, plates, blades, mugs)
+SECOND_THINGS = (prisms, implements, animals, plates, blades, mugs)
+THINGS = (*SECOND_THINGS, toys, rings)
 DRAWN_BY = {each.__name__: each for each in (*ROUND_CONES, *THINGS)}
 """The functions that draw, by family."""
-FAMILIES = {version: tuple(each.__name__ for each in group) for version, group in (("v1", ROUND_CONES), ("v2", THINGS))}
+FAMILIES = {
+    version: tuple(each.__name__ for each in group)
+    for version, group in (("v1", ROUND_CONES), ("v2", SECOND_THINGS), ("v3", THINGS))
+}
 """The names of the families, by the version of the benchmark that has them."""
 SURFACE_POINTS = 50_000  # fitted: of the whole surface, of which clouds are drawn: a dozen times as many as one has
 JUDGED_CLOUD = 4096  # fitted: points of the cloud that must be able to show the shape
 AREA_POINTS = 2000  # fitted: tell the area of a draw to a few percent
+# Derived: around an edge, as a share of the diagonal: more than roundings, and less than points are apart.
+STEADY_EDGE = 1e-9
 MOST_DRAWS, MOST_THING_DRAWS = 3000, 400  # fitted: tens to hundreds of times what any seed has needed
 
 
@@ -137,7 +145,7 @@ class Thing(Shape):
     mirror: np.ndarray
 
 
-def shape(family: str, seed: int) -> Shape:
+def shape(family: str, seed: int, *, steady: bool = False) -> Shape:
     """Draw a shape: the first fair draw of a family for this seed.
 
     Draws are refused whose topology is a matter of taste or is not in the data; `Shape.facts` tells how many were, and
@@ -149,6 +157,9 @@ def shape(family: str, seed: int) -> Shape:
         One of those in `FAMILIES`.
     seed : int
         Not negative. The same numbers give the same shape.
+    steady : bool
+        Whether normals on the edges of flat ends of `animals` are the same on all processors, as in version v3; in v2
+        roundings decide them, and thus what scanners see.
 
     Returns
     -------
@@ -175,6 +186,8 @@ def shape(family: str, seed: int) -> Shape:
         rng = generator("thing" if is_thing else "shape", family, seed, attempt)
         try:
             drawn = DRAWN_BY[family](rng).normalised()
+            if isinstance(drawn, Solid) and (steady or family != "animals"):
+                drawn.edge = STEADY_EDGE
         except UnfitDraw as reason:
             refused[str(reason)] += 1
             continue

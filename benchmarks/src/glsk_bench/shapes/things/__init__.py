@@ -1,1 +1,1 @@
-"""Things: shapes like those of real objects, of sweeps with flat or round ends, and hollow ones; six families."""
+"""Things: shapes like those of real objects, of sweeps with flat or round ends, and hollow ones; eight families."""

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..curves import UP, any_rotation, direction
-from .lines import X, Y, arc, at_lengths, lengths_along
+from .lines import X, Y, arc, lengths_along, rounded
 from .prisms import any_end
 from .section import ELLIPSE, half_axes
 from .solid import ROUND_ENDS, Solid
 
 TRUNK_PLACES, HEAD_PLACES = 25, 9  # fitted: smooth enough
 EARS_FROM = 3  # fitted: which node of a head
-ROUNDED = 2  # fitted: how often the corners of a limb are
 
 
 def animals(rng: np.random.Generator) -> Solid:
@@ -47,12 +46,9 @@ class _Animal:
     def limb(self, start, corners, radius, tip, begin=0.0, aspect=1.0, end="round", bend=0.0):
         """Add a limb along a polyline with its corners rounded, bent aside without symmetry; gives its nodes."""
         t, corners = np.linspace(0, 1, 3 * len(corners)), np.asarray(corners, float)
-        length = lengths_along(corners)[-1]
-        places = at_lengths(corners, t * length)
-        for _ in range(ROUNDED):
-            places[1:-1] = (places[:-2] + 2 * places[1:-1] + places[2:]) / 4
+        places = rounded(corners, len(t))
         if not self.symmetric:
-            places = places + bend * np.outer(t**2 * length, self.rng.normal(size=3))
+            places = places + bend * np.outer(t**2 * lengths_along(corners)[-1], self.rng.normal(size=3))
         a, b = half_axes(radius + (tip - radius) * t, aspect, ELLIPSE)
         side = Y if abs(direction(places[1] - places[0])[1]) < 0.9 else UP
         return self.solid.limb(places, a, b, ELLIPSE, side, ("round", end), start, begin=begin)

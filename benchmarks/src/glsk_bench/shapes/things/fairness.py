@@ -13,7 +13,7 @@ from .solid import Solid
 # Fitted, as all of this page: on draws that people would not agree about.
 NARROWEST_SPACINGS = 2.5  # least width of a hole of a plate, in the mean distance of 4096 points
 STUB_REACH = 0.8  # how far around a tip others are looked for, in its radius
-GAP_RADII, GAP_SPACINGS = 0.25, 0.5  # by what the solid is thickened, of the least radius, and of that distance
+GAP_SPACINGS = 0.5  # by what the solid is thickened at least, in that distance
 PART_OF_GAP = 3  # the solid is also thickened by this part of it
 CELLS, CELLS_OF_BLEND, CELLS_OF_HOLE = 0.45, 0.6, 0.4  # of the grid, in the least half axis, and in the narrowest hole
 LEAST_GRID_CELL = 0.005  # a share of the diagonal
@@ -37,7 +37,7 @@ def fault_of(solid: Solid, spacing: float) -> str | None:
         return "stub"
     components = int(component_labels(n, edges).max()) + 1
     expected = components, len(edges) - n + components, 0
-    thicker = max(GAP_RADII * radii.min(), GAP_SPACINGS * spacing)
+    thicker = max(solid.gap * radii.min(), GAP_SPACINGS * spacing)
     cells = (CELLS_OF_BLEND if solid.smoothing else CELLS) * solid.thinnest
     cell = max(min(cells, CELLS_OF_HOLE * narrowest), LEAST_GRID_CELL)
     values, _ = grid(solid, cell, thicker)

@@ -36,7 +36,7 @@ def distance(solid: Solid, points: np.ndarray, margin: float, opened: float = 0.
     if smoothing:
         total = np.zeros(len(points))
         for sweep in solid.sweeps:
-            near = sweep.distance(points, margin + BLEND_REACH * smoothing)
+            near = sweep.distance(points, margin + BLEND_REACH * smoothing, edge=solid.edge)
             weight = np.exp(-np.clip(near.values / smoothing, -MOST_EXPONENT, MOST_EXPONENT))
             total[near.rows] += weight
             gradients[near.rows] += weight[:, None] * near.gradients

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..curves import direction
 
+ROUNDED = 2  # fitted: how often the corners of a limb are
 Place = Sequence[float] | np.ndarray
 X, Y = np.array([1.0, 0, 0]), np.array([0, 1.0, 0])
 """Directions while a thing is drawn: mostly X is along it and Y across."""
@@ -25,6 +26,14 @@ def at_lengths(places: np.ndarray, lengths: np.ndarray) -> np.ndarray:
     found += np.minimum(lengths, 0)[:, None] * direction(places[1] - places[0])
     found += np.maximum(lengths - along[-1], 0)[:, None] * direction(places[-1] - places[-2])
     return found
+
+
+def rounded(corners: np.ndarray, count: int) -> np.ndarray:
+    """Places evenly along a polyline, (count, 3) float array, with its corners rounded."""
+    places = at_lengths(corners, np.linspace(0, 1, count) * lengths_along(corners)[-1])
+    for _ in range(ROUNDED):
+        places[1:-1] = (places[:-2] + 2 * places[1:-1] + places[2:]) / 4
+    return places
 
 
 def straight(start: Place, end: Place, count: int = 2) -> np.ndarray:

@@ -22,6 +22,7 @@ PART_STARTS = 0.03  # fitted
 FLAT_INSET = 0.5  # fitted: how far inside a flat face the axis ends, in the radius there: a convention
 NODES_OFF_TIP = 0.2  # fitted: nodes nearer to a tip at a flat face are left out, in the radius
 BEVEL_ROOM = 0.3  # fitted: places nearer to the inner edge of a bevel are left out, in its size
+USUAL_GAP = 0.25  # fitted: in the least radius
 Ends = Sequence[str]
 FLAT_ENDS, ROUND_ENDS = ("flat", "flat"), ("round", "round")
 """Both ends of a sweep."""
@@ -55,6 +56,11 @@ class Solid(Draft):
         A point of the plane of symmetry, and its normal.
     hollow : bool
         Whether the void is that of a vessel.
+    gap : float
+        By what the solid must not change its topology where it is thickened, in the least radius.
+    edge : float
+        Blended parts have the normal of a flat face so far around its edges. With 0, as in versions before v3, it is a
+        matter of roundings there, to which points of a blended surface are moved.
     """
 
     blend: float = 0.0
@@ -68,6 +74,8 @@ class Solid(Draft):
     openings: list[float] = field(default_factory=list)
     mirror: np.ndarray | None = None
     hollow: bool = False
+    gap: float = USUAL_GAP
+    edge: float = 0.0
 
     # ---- the axis
 

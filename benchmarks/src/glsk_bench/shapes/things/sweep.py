@@ -164,10 +164,11 @@ class Sweep:
     def _tree(self):
         return cKDTree(self.track.places)
 
-    def distance(self, points: np.ndarray, margin: float, opened: float = 0.0) -> Distance:
+    def distance(self, points: np.ndarray, margin: float, opened: float = 0.0, edge: float = 0.0) -> Distance:
         """Distances of those points that are no farther out than `margin`; of some farther ones, too.
 
-        The last face, if it is flat, is `opened` so much farther out.
+        The last face, if it is flat, is `opened` so much farther out. Points that are as far from a face as from the
+        side, to within `edge`, have the gradient of the face, and those so near beyond an end that of the side there.
         """
         rows, at = self._local(points, self.reach + margin)
         lengths, _, knot_a, knot_b = self.knots
@@ -181,7 +182,7 @@ class Sweep:
         to_y = np.sign(at.y) * (y / level) ** (self.power - 1) / a
         to_z = np.sign(at.z) * (z / level) ** (self.power - 1) / b
         widening = np.abs(to_y) * y * slope_a[k] + np.abs(to_z) * z * slope_b[k]
-        ahead = np.where(on == at.along, -widening / np.maximum(level, 1), 0.0)
+        ahead = np.where(np.abs(at.along - on) <= edge, -widening / np.maximum(level, 1), 0.0)
         if not self.closed:
             self._round_off(at.along - on, level, to_y, to_z, ahead)
         steep = np.maximum(np.sqrt(to_y * to_y + to_z * to_z + ahead * ahead), LEAST_LEVEL)
@@ -195,7 +196,7 @@ class Sweep:
             faces = -at.along, at.along - self.length - opened
             for end, face, sign in zip(self.ends, faces, (-1, 1), strict=True):
                 if end == "flat":
-                    gradients = np.where((face > values)[:, None], sign * at.ahead, gradients)
+                    gradients = np.where((face > values - edge)[:, None], sign * at.ahead, gradients)
                     values = np.maximum(face, values)
         return Distance(rows, values, gradients)
 
