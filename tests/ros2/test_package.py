@@ -53,7 +53,7 @@ def test_package_xml_names_all_that_is_imported(package, facts):
             elif isinstance(node, ast.Constant) and "/msg/" in str(node.value) and " " not in node.value:
                 imported.add(node.value.split("/")[0])
     python = {"numpy": "python3-numpy", "scipy": "python3-scipy"}
-    elsewhere = {"glsk_o3d", "rosbags", "setuptools", *sys.stdlib_module_names}
+    elsewhere = {"glsk_o3d", package.name, "rosbags", "setuptools", *sys.stdlib_module_names}
     assert {python.get(name, name) for name in imported - elsewhere} == named
 
 
