@@ -329,3 +329,6 @@ def test_the_script_does_what_the_node_does(recorded, types, tmp_path, expected,
         np.testing.assert_array_equal(line_ends(markers, rows), expected.vertices[expected.edges].reshape(-1, 3))
         np.testing.assert_array_equal(rows(pose.position for pose in poses.poses), expected.vertices)
         assert (poses.header.frame_id, poses.header.stamp.sec) == (header.frame_id, header.stamp.sec)
+    options = "--cluster 0.3 --plane-distance 0.01 --plane 0 0 1 9 --set k=20 --set size=300 --max-points 400"
+    bag.main([str(recorded), str(tmp_path / "few"), "--topic", "/points", *options.split()])
+    assert [message.width for _, topic, message in messages(tmp_path / "few", types) if "labels" in topic] == [400] * 2
