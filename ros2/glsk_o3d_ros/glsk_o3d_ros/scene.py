@@ -6,7 +6,7 @@ import numpy as np
 
 from glsk_o3d.interop.packages import import_open3d
 
-CELLS_PER_GAP = 5  # derived: a line has 11 cells within the gap to both sides, and is dense to DBSCAN
+CELLS_PER_GAP = 3  # chosen: points of a cell are less than 0.6 gaps apart, and all of a dense one in one cluster
 DENSE = 10  # published: min_points of DBSCAN in `glsk_o3d.analysis.scene_objects`
 
 
@@ -27,13 +27,17 @@ def largest_plane(points: np.ndarray, distance: float) -> np.ndarray:
 def largest_cluster(points: np.ndarray, gap: float) -> np.ndarray:
     """Which points are of the largest cluster, (N,) bool array: none if there is no cluster.
 
-    DBSCAN sees one point per cell, for the number of its pairs would grow with the square of the points within the gap.
+    DBSCAN sees as many points of a cell as make it dense: the pairs of all would grow with the square of their number.
     """
     cells = np.floor(points * (CELLS_PER_GAP / gap)).astype(int)
-    _, representative, cell = np.unique(cells, axis=0, return_index=True, return_inverse=True)
-    labels = np.array(_open3d_cloud(points[representative]).cluster_dbscan(gap, DENSE), int)[cell.ravel()]
-    counts = np.bincount(labels + 1, minlength=2)
-    return labels == np.argmax(counts[1:])
+    _, cell, counts = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    order = np.argsort(cell.ravel(), kind="stable")
+    rank_in_cell = np.arange(len(points)) - np.repeat(np.cumsum(counts) - counts, counts)
+    seen = order[rank_in_cell < DENSE]
+    label_of_cell = np.empty(len(counts), int)
+    label_of_cell[cell.ravel()[seen]] = _open3d_cloud(points[seen]).cluster_dbscan(gap, DENSE)
+    label = label_of_cell[cell.ravel()]
+    return label == np.argmax(np.bincount(label + 1, minlength=2)[1:])
 
 
 def _open3d_cloud(points):
