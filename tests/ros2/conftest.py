@@ -80,6 +80,10 @@ class FakeNode:
         self.topics[topic] = of, qos
         return callback
 
+    def create_service(self, of, topic, callback):
+        self.topics[topic] = of, None
+        return callback
+
     def get_logger(self):
         return SimpleNamespace(warning=self.logged.append)
 
@@ -99,16 +103,22 @@ def ros(types, monkeypatch):
         module(f"{package}.msg", **{name: types.types[f"{package}/msg/{name}"] for name in names})
 
     calls = []
-    classes("geometry_msgs", "PoseArray")
+    classes("geometry_msgs", "PoseArray", "TransformStamped")
     classes("sensor_msgs", "PointCloud2")
+    classes("std_msgs", "Header")
     classes("visualization_msgs", "MarkerArray")
+    module("std_srvs")
+    module("std_srvs.srv", Trigger=SimpleNamespace(Request=SimpleNamespace, Response=SimpleNamespace))
     module("rosidl_runtime_py")
     module("rosidl_runtime_py.utilities", get_message=lambda name: partial(strictly, types, name))
     rclpy = module(
-        "rclpy", calls=calls, init=lambda args: calls.append("init"), spin=lambda node: calls.append(node.name)
+        "rclpy", calls=calls, init=lambda args: calls.append("init"), spin=lambda node, on: calls.append(node.name)
     )
     rclpy.try_shutdown = lambda: calls.append("shutdown")
-    module("rclpy.executors", ExternalShutdownException=type("ExternalShutdownException", (Exception,), {}))
+    module("rclpy.duration", Duration=lambda seconds: seconds)
+    module("rclpy.time", Time=SimpleNamespace(from_msg=lambda stamp: (stamp.sec, stamp.nanosec)))
+    stopped = type("ExternalShutdownException", (Exception,), {})
+    module("rclpy.executors", ExternalShutdownException=stopped, MultiThreadedExecutor=lambda threads: threads)
     module("rclpy.node", Node=FakeNode)
     module(
         "rclpy.qos",
@@ -124,7 +134,7 @@ def ros(types, monkeypatch):
         monkeypatch.setattr(FakeNode, "given", parameters)
         return SkeletonizeNode()
 
-    yield SimpleNamespace(node=node, rclpy=rclpy)
+    yield SimpleNamespace(node=node, rclpy=rclpy, module=module)
     sys.modules.pop("glsk_o3d_ros.node", None)
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from glsk_o3d_ros.messages import cloud_of, frames_of, markers_of, points_of, poses_of
+from glsk_o3d_ros.messages import cloud_of, frames_of, markers_of, moved, points_of, poses_of
 from scipy.spatial.transform import Rotation
 
 from glsk_o3d import InvalidCloudError, pipelines, samples
@@ -68,6 +68,21 @@ def test_points_are_read_from_any_layout(packed, sent, make_message, fields, ste
     back = sent(cloud_of(points, cloud.header, make_message), CLOUD)
     np.testing.assert_array_equal(points_of(back), points)
     assert (back.width, back.height, back.is_dense, back.header) == (12, 1, False, cloud.header)
+    labelled = sent(cloud_of(points, cloud.header, make_message, np.arange(12) - 1), CLOUD)
+    np.testing.assert_array_equal(points_of(labelled), points)
+    assert [(it.name, it.offset, it.datatype, it.count) for it in labelled.fields[2:]] == [
+        ("z", 8, 7, 1),
+        ("branch", 12, 5, 1),
+    ]
+    assert labelled.data.view("<i4")[3::4].tolist() == list(range(-1, 11))
+
+
+def test_points_move_to_the_target_frame(make_message):
+    quarter = make_message("geometry_msgs/msg/Quaternion", z=math.sqrt(0.5), w=math.sqrt(0.5))
+    shift = make_message("geometry_msgs/msg/Vector3", x=1.0, y=2.0, z=3.0)
+    transform = make_message("geometry_msgs/msg/Transform", rotation=quarter, translation=shift)
+    np.testing.assert_allclose(moved(np.eye(3), transform), [[1, 3, 3], [0, 2, 3], [1, 2, 4]], atol=1e-15)
+    assert moved(np.empty((0, 3)), transform).shape == (0, 3)
 
 
 @pytest.mark.parametrize(

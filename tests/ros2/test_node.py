@@ -1,16 +1,20 @@
 """The node, with an rclpy that is none: from a cloud that comes in to what it publishes; and bags, offline."""
 
+import json
+import time
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from glsk_o3d_ros import bag
-from glsk_o3d_ros.messages import cloud_of
+from glsk_o3d_ros.messages import cloud_of, moved, points_of
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin, Writer
 from scipy.spatial.transform import Rotation
 
 import glsk_o3d as glsk
 from glsk_o3d import samples
-from glsk_o3d.analysis import grasp_candidates
+from glsk_o3d.analysis import grasp_candidates, segment
 
 CLOUD = "sensor_msgs/msg/PointCloud2"
 SECOND = 10**9
@@ -38,21 +42,30 @@ def line_ends(markers, rows):
     return rows(edges.points)
 
 
+def branches(labels):
+    """The field of labels that is no coordinate."""
+    return np.frombuffer(labels.data.tobytes(), "<i4")[3::4]
+
+
 def test_a_cloud_comes_in_and_markers_and_poses_go_out(ros, cloud, expected, header, sent, rows):
     node = ros.node()
     node.on_cloud(cloud)
-    (there, markers), (topic, poses) = node.published
-    assert (there, topic) == ("~/markers", "~/poses")
+    assert [topic for topic, _ in node.published] == ["~/markers", "~/poses", "~/labels"]
+    markers, poses, labels = (message for _, message in node.published)
     markers, poses = sent(markers, bag.RESULTS["markers"]), sent(poses, bag.RESULTS["poses"])
     np.testing.assert_array_equal(line_ends(markers, rows), expected.vertices[expected.edges].reshape(-1, 3))
     np.testing.assert_array_equal(rows(pose.position for pose in poses.poses), expected.vertices)
     assert poses.header == header
     assert {marker.header.frame_id for marker in markers.markers} == {"camera"}
+    assert sent(labels, CLOUD).header == header
+    np.testing.assert_array_equal(points_of(labels), expected.points)
+    np.testing.assert_array_equal(branches(labels), segment(expected))
     assert node.logged == []
-    assert {topic: (of.__msgtype__, qos) for topic, (of, qos) in node.topics.items()} == {
+    assert {topic: (of.__msgtype__, qos) for topic, (of, qos) in node.topics.items() if qos} == {
         "~/input": (CLOUD, dict(depth=1, reliability="best effort")),
         "~/markers": (bag.RESULTS["markers"], dict(depth=1, durability="kept")),
         "~/poses": (bag.RESULTS["poses"], dict(depth=1, durability="kept")),
+        "~/labels": (CLOUD, dict(depth=1, durability="kept")),
     }
 
 
@@ -81,7 +94,7 @@ def test_with_an_opening_poses_are_grasps_above_a_table(ros, cloud, expected, ro
     assert len(grasps) < len(grasp_candidates(expected, 0.6))
     node = ros.node(opening=0.1)
     node.on_cloud(cloud)
-    (_, markers), (_, poses) = node.published
+    (_, markers), (_, poses), _ = node.published
     assert (len(markers.markers) >= 3, poses.poses) == (True, [])
     (warning,) = node.logged
     assert "too wide" in warning
@@ -100,6 +113,126 @@ def test_a_crop_is_what_is_worked_on(ros, cloud, points):
     assert nothing.logged == ["cloud left out: the cloud has 0 finite points, and min_points is 100"]
 
 
+@pytest.fixture
+def scene(points):
+    """The tube above a table, and beside it a smaller tube; the rows of the first one come first."""
+    sides = np.random.default_rng(0).uniform(-3, 3, (4000, 2))
+    table = np.column_stack([sides, np.full(4000, -0.5)])
+    return np.concatenate([points, points[::3] + [0, 1, 0], table]).astype(np.float32).astype(float)
+
+
+@pytest.mark.parametrize("plane", [[0.0] * 4, [0.0, 0.0, 2.0, 1.0]])
+def test_the_largest_cluster_off_the_plane_is_skeletonised(ros, scene, expected, header, make_message, rows, plane):
+    node = ros.node(cluster=0.3, plane_distance=0.02, plane=plane, max_points=0)
+    node.on_cloud(cloud_of(scene, header, make_message))
+    (_, markers), _, (_, labels) = node.published
+    np.testing.assert_array_equal(line_ends(markers, rows), expected.vertices[expected.edges].reshape(-1, 3))
+    np.testing.assert_array_equal(points_of(labels), scene[:800])
+    assert (branches(labels)[:600] == segment(expected)).all()
+    assert (branches(labels)[600:] == -1).all()
+
+
+def test_grasps_avoid_the_scene_around_the_cluster(ros, scene, expected, header, make_message, rows):
+    node = ros.node(cluster=0.3, plane_distance=0.02, opening=0.6, max_points=0)
+    node.on_cloud(cloud_of(scene, header, make_message))
+    others = dict(cloud=scene[:800], mask=np.arange(800) < 600, plane=[0.0, 0.0, 1.0, 0.5])
+    grasps = grasp_candidates(expected, 0.6, **others)
+    assert 0 < len(grasps) < len(grasp_candidates(expected, 0.6))
+    poses = node.published[1][1].poses
+    np.testing.assert_array_equal(rows(pose.position for pose in poses), grasps.position)
+
+
+def test_a_scene_without_an_object_is_left_out(ros, scene, header, make_message):
+    node = ros.node(cluster=0.1, plane_distance=0.02)
+    for part in (scene[800:], np.random.default_rng(0).uniform(-99, 99, (300, 3))):
+        node.on_cloud(cloud_of(part, header, make_message))
+    assert node.logged == [
+        "cloud left out: the cloud without its plane has 0 finite points, and min_points is 100",
+        "cloud left out: the largest cluster has 0 finite points, and min_points is 100",
+    ]
+
+
+@pytest.mark.slow
+def test_a_large_frame_is_sampled_and_takes_less_than_a_second(ros, header, make_message):
+    """640 x 480 points of a wavy surface, all finite, with an eighth of the points off it."""
+    v, u = np.mgrid[:480, :640] / 640
+    depth = 1 + 0.1 * np.sin(9 * u) * np.cos(7 * v)
+    depth += (np.random.default_rng(0).random(depth.shape) < 1 / 8) * 0.2 * u
+    message = cloud_of(np.stack([u * depth, v * depth, depth], axis=-1).reshape(-1, 3), header, make_message)
+    node = ros.node()
+    begin = time.process_time()
+    node.on_cloud(message)
+    seconds = time.process_time() - begin
+    labels = node.published[2][1]
+    assert labels.width == node.defaults["max_points"]
+    assert np.isin(points_of(labels)[:, 2], points_of(message)[:, 2]).all()
+    assert seconds < 5  # 0.4 on a core of its own
+
+
+class Transforms:
+    """A buffer of tf2 that knows one transform, and what it was asked for."""
+
+    known, asked = (), ()
+
+    def lookup_transform(self, *words):
+        type(self).asked = words
+        if not self.known:
+            raise LookupError("base does not exist")
+        return self.known[0]
+
+
+def test_points_are_transformed_to_the_target_frame(ros, cloud, points, header, make_message, monkeypatch, rows):
+    ros.module("tf2_ros", Buffer=Transforms, TransformListener=lambda buffer, node: (buffer, node))
+    node = ros.node(target_frame="base")
+    node.on_cloud(cloud)
+    assert (node.published, node.logged) == ([], ["cloud left out: base does not exist"])
+    assert Transforms.asked == ("base", "camera", (12, 345), 0.1)
+    half_turn = make_message("geometry_msgs/msg/Quaternion", x=1.0, w=0.0)
+    shift = make_message("geometry_msgs/msg/Vector3", z=2.0)
+    transform = make_message("geometry_msgs/msg/Transform", rotation=half_turn, translation=shift)
+    there = make_message("std_msgs/msg/Header", frame_id="base", stamp=header.stamp)
+    stamped = make_message("geometry_msgs/msg/TransformStamped", header=there, transform=transform)
+    monkeypatch.setattr(Transforms, "known", (stamped,))
+    node.on_cloud(cloud)
+    (_, markers), (_, poses), (_, labels) = node.published
+    skeleton = glsk.skeletonize(moved(points, transform))
+    np.testing.assert_array_equal(rows(pose.position for pose in poses.poses), skeleton.vertices)
+    assert poses.header == labels.header == markers.markers[0].header == there
+
+
+def test_a_request_is_answered_with_the_verdict_on_the_newest_cloud(ros, cloud, expected, header, make_message):
+    def ask(node):
+        return node.requests(None, SimpleNamespace())
+
+    node = ros.node()
+    answer = ask(node)
+    assert (answer.success, json.loads(answer.message)) == (False, {"error": "no cloud has come in yet"})
+    node.on_cloud(cloud)
+    answer = ask(node)
+    assert answer.success
+    assert [topic for topic, _ in node.published] == 2 * ["~/markers", "~/poses", "~/labels"]
+    assert json.loads(answer.message) == dict(
+        verdict="good",
+        score=expected.score,
+        points=600,
+        vertices=len(expected.vertices),
+        components=1,
+        loops=0,
+        ends=2,
+        branches=1,
+        poses=len(expected.vertices),
+        reasons=[],
+    )
+    ball = np.random.default_rng(0).normal(size=(600, 3))
+    node.on_cloud(cloud_of(ball / np.linalg.norm(ball, axis=1, keepdims=True), header, make_message))
+    answer = ask(node)
+    assert (answer.success, json.loads(answer.message)["verdict"]) == (False, "no curve skeleton")
+    assert "sphere" in [reason["code"] for reason in json.loads(answer.message)["reasons"]]
+    node.on_cloud(cloud_of(np.eye(3), header, make_message))
+    answer = ask(node)
+    assert (answer.success, "min_points" in json.loads(answer.message)["error"]) == (False, True)
+
+
 def test_a_bad_cloud_is_one_warning_and_the_next_is_served(ros, cloud, header, make_message, monkeypatch):
     node = ros.node()
     node.on_cloud(make_message(CLOUD, header=header))
@@ -112,9 +245,9 @@ def test_a_bad_cloud_is_one_warning_and_the_next_is_served(ros, cloud, header, m
     ]
     assert node.published == []
     node.on_cloud(cloud)
-    assert len(node.published) == 2
+    assert len(node.published) == 3
     with monkeypatch.context() as patch:  # an error that nobody has foreseen
-        patch.setattr(node, "skeletonizer", lambda cloud: 1 / 0)
+        patch.setattr(node, "skeletonizer", lambda *_: 1 / 0)
         node.on_cloud(cloud)
     assert node.logged[3:] == ["cloud left out: division by zero"]
 
@@ -129,6 +262,9 @@ def test_a_bad_cloud_is_one_warning_and_the_next_is_served(ros, cloud, header, m
         (dict(accept="any"), "accept = 'any'"),
         (dict(plane=[0.0, 0.0, 1.0]), r"plane = \[0.0, 0.0, 1.0\]: must be a, b, c, d"),
         (dict(plane=[0.0, 0.0, 1.0, 0.0]), "is for grasps: give the opening"),
+        (dict(cluster=-1.0), "cluster = -1"),
+        (dict(plane_distance=float("inf")), "plane_distance = inf"),
+        (dict(max_points=-1), "max_points = -1"),
     ],
 )
 def test_wrong_parameters_end_the_node_at_once(ros, parameters, message):
@@ -187,9 +323,12 @@ def test_the_script_does_what_the_node_does(recorded, types, tmp_path, expected,
     assert output.err == f"cloud at {2 * SECOND} left out: the cloud has 3 finite points, and min_points is 100\n"
     actual = messages(tmp_path / "out", types)
     assert [(time, topic) for time, topic, _ in actual] == [
-        (time * SECOND, f"/skeletonize_node/{name}") for time in (1, 3) for name in ("markers", "poses")
+        (time * SECOND, f"/skeletonize_node/{name}") for time in (1, 3) for name in ("markers", "poses", "labels")
     ]
-    for (_, _, markers), (_, _, poses) in zip(actual[::2], actual[1::2], strict=True):
+    for (_, _, markers), (_, _, poses) in zip(actual[::3], actual[1::3], strict=True):
         np.testing.assert_array_equal(line_ends(markers, rows), expected.vertices[expected.edges].reshape(-1, 3))
         np.testing.assert_array_equal(rows(pose.position for pose in poses.poses), expected.vertices)
         assert (poses.header.frame_id, poses.header.stamp.sec) == (header.frame_id, header.stamp.sec)
+    options = "--cluster 0.3 --plane-distance 0.01 --plane 0 0 1 9 --set k=20 --set size=300 --max-points 400"
+    bag.main([str(recorded), str(tmp_path / "few"), "--topic", "/points", *options.split()])
+    assert [message.width for _, topic, message in messages(tmp_path / "few", types) if "labels" in topic] == [400] * 2

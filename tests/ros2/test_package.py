@@ -1,6 +1,7 @@
 """What colcon and ros2 launch find: setup.py, package.xml and the launch file, with stand-ins for what they import."""
 
 import ast
+import re
 import runpy
 import sys
 from types import ModuleType, SimpleNamespace
@@ -53,7 +54,7 @@ def test_package_xml_names_all_that_is_imported(package, facts):
             elif isinstance(node, ast.Constant) and "/msg/" in str(node.value) and " " not in node.value:
                 imported.add(node.value.split("/")[0])
     python = {"numpy": "python3-numpy", "scipy": "python3-scipy"}
-    elsewhere = {"glsk_o3d", "rosbags", "setuptools", *sys.stdlib_module_names}
+    elsewhere = {"glsk_o3d", package.name, "rosbags", "setuptools", *sys.stdlib_module_names}
     assert {python.get(name, name) for name in imported - elsewhere} == named
 
 
@@ -88,3 +89,10 @@ def test_the_launch_file_starts_the_node_with_its_parameters(package, ros, insta
         assert parameters[name].words == (name,)
         value = ast.literal_eval(argument.default_value) if get_origin(kind) is list else kind(argument.default_value)
         assert (value, type(value)) == (asked[name], type(asked[name]))
+
+
+def test_the_page_has_a_row_for_every_parameter_topic_and_service(package, ros):
+    page = (package.parents[1] / "docs" / "robots.md").read_text(encoding="utf-8")
+    node = ros.node()
+    assert re.findall(r"^\| `([a-z_]+)` \| (?!`)", page, re.M) == list(node.defaults)
+    assert set(re.findall(r"^\| `(~/[a-z]+)`", page, re.M)) == set(node.topics)

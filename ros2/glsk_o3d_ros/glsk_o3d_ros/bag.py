@@ -16,10 +16,11 @@ from rosbags.typesys import Stores, get_typestore
 from glsk_o3d import GlskError
 
 from .messages import Make
-from .skeletonizer import NO_PLANE, Skeletonizer
+from .parameters import PARAMETERS
+from .skeletonizer import Skeletonizer
 
 CLOUD = "sensor_msgs/msg/PointCloud2"
-RESULTS = {"markers": "visualization_msgs/msg/MarkerArray", "poses": "geometry_msgs/msg/PoseArray"}
+RESULTS = {"markers": "visualization_msgs/msg/MarkerArray", "poses": "geometry_msgs/msg/PoseArray", "labels": CLOUD}
 PLAIN = {"string": "", "bool": False, "float32": 0.0, "float64": 0.0}  # what fields are by default; numbers are 0
 
 
@@ -43,7 +44,7 @@ def maker(types: Any) -> Make:
 
 
 def convert(source: Path, target: Path, topic: str, **options: Any) -> int:
-    """Write a bag of markers and poses for the clouds in another; gives how many there were.
+    """Write a bag of markers, poses and labels for the clouds in another; gives how many there were.
 
     Parameters
     ----------
@@ -93,11 +94,11 @@ def main(words: list[str] | None = None) -> None:
     parser.add_argument("source", type=Path, help="bag of ROS 2 (a folder) or ROS 1 (a file)")
     parser.add_argument("target", type=Path, help="bag to write: a folder that is not there yet")
     parser.add_argument("--topic", required=True, help="where the clouds are")
-    parser.add_argument("--pipeline", default="default", help="name of a pipeline, or path of a recipe")
-    parser.add_argument("--set", action="append", default=[], dest="settings", help="parameter=value; repeatable")
-    parser.add_argument("--min-points", type=int, default=100, help="fewest points of a cloud to work on")
-    parser.add_argument("--opening", type=float, default=0.0, help="widest opening of a gripper: poses are grasps")
-    parser.add_argument("--plane", type=float, nargs=4, default=NO_PLANE, metavar=tuple("ABCD"), help="a table")
+    for name, (default, meaning) in PARAMETERS.items():
+        if name != "target_frame":  # a bag is read without tf2
+            kind = dict(nargs=len(default), type=float) if isinstance(default, list) else dict(type=type(default))
+            kind = dict(action="append") if name == "set" else kind
+            parser.add_argument("--" + name.replace("_", "-"), default=default, help=meaning, **kind)
     options = vars(parser.parse_args(words))
     try:
         print(f"{convert(**options)} clouds skeletonised: {options['target']}")

@@ -17,6 +17,7 @@ Make = Callable[..., Any]
 """Makes a message: ``make("geometry_msgs/msg/Point", x=1.0)``. Fields that are not named have their defaults."""
 
 REALS = {7: "f4", 8: "f8"}  # published: FLOAT32 and FLOAT64 of sensor_msgs/msg/PointField
+FIELD_TYPES = {"<f4": 7, "<i4": 5}  # published: FLOAT32 and INT32
 LINE_LIST, SPHERE_LIST, ADD, DELETEALL = 5, 7, 0, 3  # published: of visualization_msgs/msg/Marker
 THINNER = 0.2  # fitted to the eye: width of lines over the median radius
 UPRIGHT = 1e-6  # fitted: sine of the angle to the vertical below which a curve has no horizontal direction
@@ -70,7 +71,13 @@ def points_of(cloud: Any) -> np.ndarray:
     return np.stack([rows[name] for name in "xyz"], axis=-1).reshape(-1, 3).astype(float)
 
 
-def cloud_of(points: np.ndarray, header: Any, make: Make) -> Any:
+def moved(points: np.ndarray, transform: Any) -> np.ndarray:
+    """Points, (N, 3) float array, in the target frame of a ``geometry_msgs/msg/Transform``."""
+    turn, shift = transform.rotation, transform.translation
+    return Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).apply(points) + [shift.x, shift.y, shift.z]
+
+
+def cloud_of(points: np.ndarray, header: Any, make: Make, branch: np.ndarray | None = None) -> Any:
     """Points as a ``sensor_msgs/msg/PointCloud2`` of one row, as FLOAT32, which all that show clouds read.
 
     Parameters
@@ -79,25 +86,31 @@ def cloud_of(points: np.ndarray, header: Any, make: Make) -> Any:
     header : std_msgs/msg/Header
     make : callable
         See `Make`.
+    branch : (N,) int array, optional
+        Of every point: a fourth field, as INT32.
 
     Returns
     -------
     PointCloud2
     """
-    points = np.asarray(points, "<f4").reshape(-1, 3)
+    columns = dict(zip("xyz", np.asarray(points, "<f4").reshape(-1, 3).T, strict=True))
+    if branch is not None:
+        columns["branch"] = np.asarray(branch, "<i4")
+    rows = np.rec.fromarrays(list(columns.values()), names=list(columns))
     fields = [
-        make("sensor_msgs/msg/PointField", name=name, offset=4 * i, datatype=7, count=1) for i, name in enumerate("xyz")
+        make("sensor_msgs/msg/PointField", name=name, offset=4 * i, datatype=FIELD_TYPES[column.dtype.str], count=1)
+        for i, (name, column) in enumerate(columns.items())
     ]
     return make(
         "sensor_msgs/msg/PointCloud2",
         header=header,
         height=1,
-        width=len(points),
+        width=len(rows),
         fields=fields,
         is_bigendian=False,
-        point_step=12,
-        row_step=12 * len(points),
-        data=array("B", points.tobytes()),
+        point_step=rows.itemsize,
+        row_step=rows.nbytes,
+        data=array("B", rows.tobytes()),
         is_dense=bool(np.isfinite(points).all()),
     )
 

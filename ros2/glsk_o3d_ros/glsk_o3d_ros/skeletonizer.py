@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -10,25 +11,43 @@ from typing import Any
 import numpy as np
 
 from glsk_o3d import InvalidCloudError, InvalidParameterError, Skeleton, SkeletonWarning, Verdict
-from glsk_o3d.analysis import Gripper, grasp_candidates
+from glsk_o3d.analysis import Gripper, grasp_candidates, segment
 from glsk_o3d.analysis.grasp_checks import checked_plane
 from glsk_o3d.api import as_pipeline
 from glsk_o3d.cli.overrides import override
+from glsk_o3d.parameters import check_number
 
-from .messages import Make, frames_of, markers_of, points_of, poses_of
-
-NO_PLANE = (0.0, 0.0, 0.0, 0.0)
-NO_CROP = (0.0,) * 6
+from .messages import Make, cloud_of, frames_of, markers_of, moved, points_of, poses_of
+from .scene import largest_cluster, largest_plane, sample
 
 
 @dataclass(frozen=True)
 class Results:
-    """What is published about a cloud, the skeleton itself, and what was warned of."""
+    """What is published about a cloud, the skeleton itself, whether it is accepted, and what was warned of."""
 
     markers: Any
     poses: Any
+    labels: Any
     skeleton: Skeleton
+    accepted: bool
     warnings: tuple[str, ...]
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Verdict, score, counts and reasons, as JSON has them."""
+        skeleton = self.skeleton
+        return dict(
+            verdict=skeleton.verdict.value,
+            score=None if math.isnan(skeleton.score) else float(skeleton.score),
+            points=len(skeleton.points),
+            vertices=len(skeleton.vertices),
+            components=int(skeleton.n_components),
+            loops=int(skeleton.n_loops),
+            ends=len(skeleton.leaves),
+            branches=len(skeleton.branches),
+            poses=len(self.poses.poses),
+            reasons=[dict(code=reason.code, text=reason.text) for reason in skeleton.reasons],
+        )
 
 
 class Skeletonizer:
@@ -38,81 +57,99 @@ class Skeletonizer:
     ----------
     make : callable
         See `glsk_o3d_ros.messages.Make`.
-    pipeline : str
-        Name of a pipeline, or path of a recipe.
-    settings : iterable of str
-        Parameters that are to differ: ``"Connector.radius=2%"``. Empty ones are left out.
-    min_points : int
-        Fewest points with finite coordinates that are worked on.
-    opening : float
-        Widest opening of a gripper, in the cloud's units; 0 for none.
-    plane : sequence of 4 floats
-        A table, ax + by + cz + d = 0, in the frame of the cloud: no grasp reaches behind it. Four zeros for none.
-    crop : sequence of 6 floats
-        Least x, y, z and greatest x, y, z of the points that are worked on, in the frame of the cloud. Six zeros
-        for all.
-    accept : str
-        Worst verdict of a skeleton that gets grasps.
+    **parameters
+        Those of `glsk_o3d_ros.parameters.PARAMETERS`, without the target frame.
 
     Raises
     ------
     GlskError
-        The pipeline, its recipe, a setting, the opening, the plane, the crop or the verdict is wrong, or there is
-        a plane without an opening.
+        A parameter is wrong, or there is a plane with neither an opening nor a distance from it.
     """
 
     def __init__(
         self,
         make: Make,
-        pipeline: str = "default",
-        settings: Iterable[str] = (),
-        min_points: int = 100,
-        opening: float = 0.0,
-        plane: Sequence[float] = NO_PLANE,
-        crop: Sequence[float] = NO_CROP,
-        accept: str = Verdict.DOUBTFUL.value,
+        *,
+        pipeline: str,
+        set: Iterable[str],
+        crop: Sequence[float],
+        max_points: int,
+        plane: Sequence[float],
+        plane_distance: float,
+        cluster: float,
+        min_points: int,
+        opening: float,
+        accept: str,
     ) -> None:
-        if not opening >= 0:
-            raise InvalidParameterError(f"opening = {opening}: must be 0, for no grasps, or more")
+        for name, length in (("opening", opening), ("plane_distance", plane_distance), ("cluster", cluster)):
+            check_number(name, length, low=0)
+        check_number("max_points", max_points, "int", low=0)
         if len(plane) != 4:
             raise InvalidParameterError(
                 f"plane = {list(plane)}: must be a, b, c, d of ax + by + cz + d = 0; all 0 for none"
             )
-        self.make, self.min_points = make, min_points
-        self.gripper = Gripper(opening) if opening else None
         self.plane = checked_plane(plane) if any(plane) else None
-        if not opening and any(plane):
-            raise InvalidParameterError("plane is for grasps: give the opening of the gripper, too")
+        if any(plane) and not (opening or plane_distance):
+            raise InvalidParameterError("plane is for grasps: give the opening of the gripper, or plane_distance")
         if len(crop) != 6 or (any(crop) and not np.less(crop[:3], crop[3:]).all()):
             raise InvalidParameterError(f"crop = {list(crop)}: must be least x, y, z and greatest; all 0 for none")
         if accept not in list(Verdict):
             raise InvalidParameterError(f"accept = {accept!r}: must be one of {', '.join(it.value for it in Verdict)}")
-        self.crop, self.accept = np.reshape(crop, (2, 3)) if any(crop) else None, accept
-        self.pipeline = override(as_pipeline(pipeline), filter(None, settings))
+        self.make, self.min_points, self.max_points = make, min_points, max_points
+        self.crop = np.reshape(crop, (2, 3)) if any(crop) else None
+        self.plane_distance, self.cluster = plane_distance, cluster
+        self.gripper, self.accept = Gripper(opening) if opening else None, Verdict(accept)
+        self.pipeline = override(as_pipeline(pipeline), filter(None, set))
 
-    def __call__(self, cloud: Any) -> Results:
+    def __call__(self, cloud: Any, transform: Any = None) -> Results:
         """The messages about a ``sensor_msgs/msg/PointCloud2``, in its frame and with its stamp.
 
-        Poses are the grasps if there is an opening, the best of each place first, or else the frames along the
-        skeleton. GlskError if the cloud cannot be skeletonised.
+        With a ``geometry_msgs/msg/TransformStamped`` they are in the frame that it leads to. Poses are the grasps if
+        there is an opening, the best of each place first, or else the frames along the skeleton. GlskError if the cloud
+        cannot be skeletonised.
         """
-        points = points_of(cloud)
-        points = points[np.isfinite(points).all(axis=1)]
-        if self.crop is not None:
-            points = points[((points >= self.crop[0]) & (points <= self.crop[1])).all(axis=1)]
-        if len(points) < self.min_points:
-            raise InvalidCloudError(f"the cloud has {len(points)} finite points, and min_points is {self.min_points}")
+        header = cloud.header if transform is None else transform.header
+        scene, plane = self._scene(cloud, transform)
+        mask = largest_cluster(scene, self.cluster) if self.cluster else np.ones(len(scene), bool)
+        self._check_size("the largest cluster", scene[mask])
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("ignore")
             warnings.simplefilter("always", SkeletonWarning)
-            skeleton = self.pipeline(points)
+            skeleton = self.pipeline(scene[mask])
             if self.gripper is None:
                 frames = frames_of(skeleton)
             else:
-                frames = grasp_candidates(skeleton, self.gripper, plane=self.plane, accept=self.accept).poses
+                around = {} if mask.all() else dict(cloud=scene, mask=mask)
+                frames = grasp_candidates(skeleton, self.gripper, plane=plane, accept=self.accept, **around).poses
+        branch = np.full(len(scene), -1)
+        if len(skeleton.vertices):
+            branch[mask] = segment(skeleton)
         return Results(
-            markers_of(skeleton, cloud.header, self.make),
-            poses_of(frames, cloud.header, self.make),
+            markers_of(skeleton, header, self.make),
+            poses_of(frames, header, self.make),
+            cloud_of(scene, header, self.make, branch),
             skeleton,
+            skeleton.verdict.is_at_least(self.accept),
             tuple(str(warning.message) for warning in caught),
         )
+
+    def _scene(self, cloud, transform):
+        """The points that are worked on, (N, 3) float array, and the plane, (4,) float array or None."""
+        points, plane = points_of(cloud), self.plane
+        points = points[np.isfinite(points).all(axis=1)]
+        if transform is not None:
+            points = moved(points, transform.transform)
+        if self.crop is not None:
+            points = points[((points >= self.crop[0]) & (points <= self.crop[1])).all(axis=1)]
+        self._check_size("the cloud", points)
+        size = self.max_points or len(points)
+        if self.plane_distance:  # before the sample, as most points of a frame are of the table
+            plane = largest_plane(sample(points, size), self.plane_distance) if plane is None else plane
+            distance = abs(points @ plane[:3] + plane[3]) / np.linalg.norm(plane[:3])
+            points = points[distance > self.plane_distance]
+            self._check_size("the cloud without its plane", points)
+        return sample(points, size), plane
+
+    def _check_size(self, what, points):
+        if len(points) < self.min_points:
+            raise InvalidCloudError(f"{what} has {len(points)} finite points, and min_points is {self.min_points}")
