@@ -35,9 +35,13 @@ print(
 )
 
 # %%
-# The measures for foresters. The radius of a traced twig is the scatter of its points.
+# The measures for foresters. The radius of a traced twig is the scatter of its points. A warning says how much of the
+# length has no surface.
 
-measures = glsk.analysis.tree_measures(tree)
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore", glsk.SkeletonWarning)
+    measures = glsk.analysis.tree_measures(tree)
+print(measures.doubts[-1])
 print(f"height {measures.height:.2f} m, diameter at 1.3 m {measures.stem_diameter:.3f} m")
 print(f"the lowest branch leaves the stem at {measures.crown_base:.2f} m")
 for order, volume in enumerate(measures.volume):

@@ -52,9 +52,9 @@ class BranchTable(Rows, row="branch"):
         and for a closed branch or parent.
     points : (B,) int array
         Points of the skeleton's cloud that belong to the branch; see `segment`.
-    confidence, support : (B,) float arrays
-        Mean confidence; share of samples of the cloud that show its least supported place or end, see
-        `glsk_o3d.support`.
+    confidence, score, support : (B,) float arrays
+        Mean confidence; `Skeleton.branch_scores`; and the share of samples of the cloud that show its least supported
+        place or end, see `glsk_o3d.support`.
     axis, order : (B,) int arrays
         The first row of the axis of the branch. At a junction the thickest and straightest of the branches with much
         growth beyond them continues the axis. Centrifugal (Gravelius) order: 0 for axes at the root, and one more for
@@ -77,6 +77,7 @@ class BranchTable(Rows, row="branch"):
     angle: np.ndarray
     points: np.ndarray
     confidence: np.ndarray
+    score: np.ndarray
     support: np.ndarray
     axis: np.ndarray
     order: np.ndarray
@@ -176,6 +177,7 @@ def branch_table(skeleton: Skeleton, root: Any = None) -> BranchTable:
         angle=angle,
         points=np.bincount(label[label >= 0], minlength=len(paths)),
         confidence=mean(skeleton.confidence),
+        score=np.append(skeleton.branch_scores, np.full(len(paths) - len(skeleton.branches), np.nan)),
         support=np.array([skeleton.support[path].min() for path in paths]),
         axis=axis,
         order=order,

@@ -10,10 +10,19 @@ CLASS_WIDTH = 0.05  # published: metres; foresters' classes of diameters
 
 
 def diameter_classes(pieces: Cylinders, unit: float = 1.0, width: float = CLASS_WIDTH) -> tuple[dict[str, float], ...]:
-    """Length and volume of cylinders by diameter, in metres: a dict for each class that is not empty.
+    """Length and volume of cylinders by diameter, in metres.
 
-    Its names are ``low`` and ``high``, and those of the sums of `TreeMeasures`. A diameter between two classes is in
-    the upper one. `unit` and `width` are one unit of the cloud, and the width of a class, in metres.
+    Parameters
+    ----------
+    pieces : Cylinders
+    unit, width : float
+        One unit of the cloud, and the width of a class, in metres.
+
+    Returns
+    -------
+    tuple of dict
+        One for each class that is not empty, with the names ``low`` and ``high``, and those of the sums of
+        `TreeMeasures`. A diameter between two classes is in the upper one.
 
     Examples
     --------

@@ -123,7 +123,17 @@ class Stem:
 
 
 def stem(skeleton: Any, root: Any = None, *, up: str | None = None, unit: float = 1.0) -> Stem:
-    """The stem of a tree, to measure its diameter at any height; parameters and errors are those of `tree_measures`."""
+    """The stem of a tree, to measure its diameter at any height.
+
+    Parameters
+    ----------
+    skeleton, root, up, unit
+        As of `tree_measures`, with the same errors.
+
+    Returns
+    -------
+    Stem
+    """
     up, skeleton = up_axis(skeleton, root, up), skeleton.whole
     check_number("unit", unit, low=0, open_low=True)
     pieces, near = cylinders(skeleton, root, up), points_near(skeleton)

@@ -132,6 +132,21 @@ class Skeleton(SpaceCurve):
         """
         return graph_score(self.report.decisions, self.confidence)
 
+    @derived("report", "confidence", "vertices", "edges")
+    def branch_scores(self) -> np.ndarray:
+        """The same of every branch, (B,) float array: by the decisions at places on it, and by its own confidence.
+
+        Not calibrated by itself: it says which branches the doubt is about.
+        """
+        decisions = self.report.decisions if len(self.branches) else ()
+        places = np.array([decision.place for decision in decisions]).reshape(-1, 3)
+        branch = self.nearest(places).branch if len(places) else np.empty(0, int)
+        scores = [
+            graph_score([decisions[row] for row in np.flatnonzero(branch == number)], self.confidence[path])
+            for number, path in enumerate(self.branches)
+        ]
+        return np.array(scores)
+
     @property
     def reasons(self) -> tuple[Reason, ...]:
         """Why not to rely on it: those of the report, and a low or unknown score."""

@@ -81,3 +81,13 @@ def test_the_score_follows_the_decisions_of_an_edited_skeleton():
     ring = skeletonize(samples.torus(1000).points)
     report = replace(ring.report, decisions=(*ring.report.decisions, decision("loop", 0.5)))
     assert replace(ring, report=report).score < ring.score
+
+
+def test_a_doubt_is_about_the_branch_that_it_is_at():
+    fork = skeletonize(samples.y_junction(1500).points)
+    row = 1
+    middle = fork.places(row, 0.5 * fork.edge_lengths[fork.branch_of_edge == row].sum()).position[0]
+    doubt = Decision("air", tuple(middle.tolist()), 0.5, False)
+    unsure = replace(fork, report=replace(fork.report, decisions=(*fork.report.decisions, doubt)))
+    assert np.flatnonzero(unsure.branch_scores < fork.branch_scores).tolist() == [row]
+    assert Skeleton([[0, 0, 0]], (), [1], (), (), ()).branch_scores.shape == (0,)

@@ -129,7 +129,7 @@ class Skeletonizer:
             poses_of(frames, header, self.make),
             cloud_of(scene, header, self.make, branch),
             skeleton,
-            skeleton.verdict.is_at_least(self.accept),
+            skeleton.verdict >= self.accept,
             tuple(str(warning.message) for warning in caught),
         )
 
