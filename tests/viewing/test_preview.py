@@ -69,15 +69,20 @@ def test_planar_clouds_and_clouds_without_a_skeleton(make, tmp_path):
     assert drawn == [(True, True), (False, True), (False, False)]
 
 
+def open_figures():
+    """Those of pyplot, which other tests of this process may have opened."""
+    return sys.modules["matplotlib.pyplot"].get_fignums() if "matplotlib.pyplot" in sys.modules else []
+
+
 def test_the_same_picture_every_time_without_global_state(tree, tmp_path):
     points = np.random.default_rng(0).normal(size=(20_001, 3))
     many = dataclasses.replace(tree, points=points, vertex_of_point=None, normals=None)
-    before = dict(matplotlib.rcParams)
+    before, figures = dict(matplotlib.rcParams), open_figures()
     for name in "ab":
         save_preview(many, tmp_path / f"{name}.png")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     assert dict(matplotlib.rcParams) == before
-    assert "matplotlib.pyplot" not in sys.modules or not sys.modules["matplotlib.pyplot"].get_fignums()
+    assert open_figures() == figures
 
 
 @pytest.mark.parametrize(("save", "ending"), [(save_preview, "png"), (save_report, "html")])
