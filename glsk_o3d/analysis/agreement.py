@@ -78,7 +78,7 @@ def compare_skeletons(ours: Skeleton, theirs: Skeleton, step: float) -> Skeleton
     closest = [
         min(calls, key=lambda call: abs(call.probability - 0.5)) for calls in map(_limbs, (ours, theirs)) if calls
     ]
-    certainty = [max(call.probability, 1 - call.probability) for call in closest]
+    certainty = [call.certainty for call in closest]
     return SkeletonAgreement(
         distance_in_radii=float(np.mean([distance.mean() for distance in in_radii])),
         hausdorff95_in_radii=float(max(np.percentile(distance, 95) for distance in in_radii)),

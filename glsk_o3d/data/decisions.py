@@ -76,6 +76,11 @@ class Decision:
     radii: tuple[float, ...] = ()
 
     @property
+    def certainty(self) -> float:
+        """Probability of the likelier answer, from a half to 1."""
+        return max(self.probability, 1 - self.probability)
+
+    @property
     def is_uncertain(self) -> bool:
         """Whether the probability lies between a quarter and three quarters."""
         return 0.25 <= self.probability <= 0.75

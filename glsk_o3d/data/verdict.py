@@ -119,7 +119,7 @@ def graph_score(decisions: Iterable[Decision], confidence: np.ndarray) -> float:
     certainty = dict(topology=1.0, limb=1.0)
     for decision in decisions:
         fact = "limb" if decision.about == "limb" else "topology"
-        certainty[fact] = min(certainty[fact], max(decision.probability, 1 - decision.probability))
+        certainty[fact] = min(certainty[fact], decision.certainty)
     return logistic(SCORE, dict(certainty, confidence=quantile(known, LOW_CONFIDENCE_SHARE)))
 
 
