@@ -81,11 +81,17 @@ def _sheet(curve: Curve) -> Reason | None:
     return Reason("sheet", text, numbers=dict(share=share)) if share > CURVE.majority else None
 
 
+def _by_component(curve: Curve) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The component of every point of the cloud, the points of each, (c, 1), and where they are, from one vertex."""
+    component = curve.component_of_vertex[curve.cloud.vertex]
+    size = np.bincount(component, minlength=curve.n_components)[:, None]
+    return component, size, curve.cloud.points - curve.vertices[0]
+
+
 def _ball(curve: Curve) -> Reason | None:
     """The normal lines of components with most of the points meet in one point."""
     cloud, n = curve.cloud, curve.n_components
-    component = curve.component_of_vertex[cloud.vertex]
-    size, points = np.bincount(component, minlength=n)[:, None], cloud.points - curve.vertices[0]
+    component, size, points = _by_component(curve)
     along = np.einsum("ni,nj->nij", cloud.normals, cloud.normals)
     # of every normal line I - n n^T, which takes away what is along it
     regular = WARN.regular * np.maximum(size, 1)
@@ -108,8 +114,7 @@ def _ball(curve: Curve) -> Reason | None:
 def _stubs(curve: Curve) -> Reason | None:
     """Components with most of the points are hardly longer than thick."""
     cloud, n = curve.cloud, curve.n_components
-    component = curve.component_of_vertex[cloud.vertex]
-    size, points = np.bincount(component, minlength=n)[:, None], cloud.points - curve.vertices[0]
+    component, size, points = _by_component(curve)
     mean = group_sum(points, component, n) / np.maximum(size, 1)
     products = np.einsum("ni,nj->nij", points, points)
     spread = group_sum(products, component, n) / np.maximum(size, 1)[:, :, None] - mean[:, :, None] * mean[:, None]
