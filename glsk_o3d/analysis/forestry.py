@@ -18,6 +18,7 @@ BREAST_HEIGHT = 1.3  # published: metres above the ground at which foresters mea
 TALLEST_TREE = 116.07  # published: metres, Hyperion, the tallest tree known, as measured in 2019
 FORM_FACTOR = 2.0  # derived: wood over a cylinder as thick as at 1.3 m and as high as the tree; branches as thick as
 # the trunk together (Leonardo) that reach to the top fill one, and their bends and the foot do not double that
+MOST_ERROR = 0.05  # derived: of the diameter at 1.3 m, a tenth of the wood
 MOST_TRACED = 0.5  # derived: of the length; above that the volume says nothing of most of the tree
 NEEDS_LEAF_OFF = (
     "has no surface, and no volume: twigs thinner than the points are apart, or leaves, which the cloud does not tell "
@@ -33,9 +34,9 @@ class TreeMeasures:
     ----------
     height : float
         Of the highest point above the foot of the stem, without points farther than three radii from the curve.
-    stem_diameter, stem_arc : float
-        Of the circle through the points of the stem in a slice of 10 cm across it, 1.3 m above the foot; degrees of it
-        with points. NaN without such a circle.
+    stem_diameter, stem_error, stem_arc : float
+        Of the circle through the points of the stem in a slice of 10 cm across it, 1.3 m above the foot; its standard
+        deviation, over the diameter; degrees of the circle with points. NaN without such a circle.
     crown_base : float
         Height at which the lowest branch leaves the stem; NaN without one.
     crown_area, crown_volume : float
@@ -61,6 +62,7 @@ class TreeMeasures:
 
     height: float
     stem_diameter: float
+    stem_error: float
     stem_arc: float
     crown_base: float
     crown_area: float
@@ -112,7 +114,7 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
     -----
     SkeletonWarning
         The root is in the upper half of the tree, the tree is taller than any known one or has too much wood for its
-        size, the diameter at 1.3 m is unknown, or most of the length has no surface.
+        size, the diameter at 1.3 m is unknown or of little certainty, or most of the length has no surface.
 
     Examples
     --------
@@ -144,6 +146,7 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
     return TreeMeasures(
         height=highest,
         stem_diameter=2 * section.radius,
+        stem_error=section.error,
         stem_arc=section.arc,
         crown_base=crown_base,
         crown_area=area,
@@ -188,6 +191,11 @@ def _doubts(
         )
     if problem and highest > BREAST_HEIGHT:
         doubts.append(f"the diameter of the stem at {BREAST_HEIGHT} m is not known: {problem}")
+    if section.error > MOST_ERROR:
+        doubts.append(
+            f"the diameter of the stem at {BREAST_HEIGHT} m has a standard deviation of {100 * section.error:.0f} %: "
+            f"points show {section.arc:.0f} degrees of it: scan it from other sides, too"
+        )
     share = volume / (np.pi * section.radius**2 * highest)
     if share > FORM_FACTOR:
         thick = f"{200 * section.radius:.3g} cm thick, as at {BREAST_HEIGHT} m"
