@@ -76,7 +76,7 @@ class Stem:
         return 2 * self.circle_at(height)[0].radius
 
     def taper(self) -> tuple[dict[str, float], ...]:
-        """Height, diameter, its error, arc, and diameter of the cylinder, by their names, at up to twenty round heights."""
+        """Height, diameter, its error, arc, diameter of the cylinder, by their names, at up to twenty round heights."""
         step = next(
             (step for step in TAPER_STEPS if self.top < step * (MOST_TAPER_SECTIONS + 1)),
             self.top / MOST_TAPER_SECTIONS,
