@@ -44,7 +44,7 @@ from .filters.tracer import Tracer
 from .interop.clouds import Cloud
 from .io.annotation import annotate
 from .io.formats.gltf import save_rig
-from .io.geometry import to_line_set, to_tubes
+from .io.geometry import to_line_set, to_tubes, to_voxels
 from .io.scans import read_cloud, read_tensor_cloud
 from .io.skeletons import read_skeleton, read_truth, save_skeleton
 from .io.streaming import annotate_file, read_sample
@@ -124,4 +124,5 @@ __all__ = [
     "to_pymeshlab",
     "to_recipe",
     "to_tubes",
+    "to_voxels",
 ]
