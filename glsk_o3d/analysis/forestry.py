@@ -11,7 +11,7 @@ from ..data.skeleton import Skeleton
 from ..errors import GlskError, SkeletonWarning
 from ..geometry.vectors import TINY
 from .circles import CircleFit
-from .crowns import crown_hulls, diameter_classes
+from .crowns import crown_hulls, diameter_classes, loose_points
 from .stems import stem
 
 BREAST_HEIGHT = 1.3  # published: metres above the ground at which foresters measure stems
@@ -20,10 +20,9 @@ FORM_FACTOR = 2.0  # derived: wood over a cylinder as thick as at 1.3 m and as h
 # the trunk together (Leonardo) that reach to the top fill one, and their bends and the foot do not double that
 MOST_ERROR = 0.05  # derived: of the diameter at 1.3 m, a tenth of the wood
 MOST_TRACED = 0.5  # derived: of the length; above that the volume says nothing of most of the tree
-NEEDS_LEAF_OFF = (
-    "has no surface, and no volume: twigs thinner than the points are apart, or leaves, which the cloud does not tell "
-    "apart: needs leaf-off, or more points"
-)
+MOST_FAR = 0.05  # fitted: of the points, far from the surface of bare wood
+LEAST_IN_ROWS = 0.55  # fitted: how much points off the wood are in rows, of bare twigs; those of leaves are less
+NO_SURFACE = "has no surface, and no volume: twigs thinner than the points are apart"
 
 
 @dataclass(frozen=True)
@@ -114,7 +113,8 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
     -----
     SkeletonWarning
         The root is in the upper half of the tree, the tree is taller than any known one or has too much wood for its
-        size, the diameter at 1.3 m is unknown or of little certainty, or most of the length has no surface.
+        size, the diameter at 1.3 m is unknown or of little certainty, most of the length has no surface, or there are
+        leaves.
 
     Examples
     --------
@@ -139,8 +139,12 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
     wood = float(volumes[~traced].sum())
     traced_share = known * float(lengths[traced].sum() / max(lengths.sum(), TINY))
     doubts = _doubts(-low / max(high - low, TINY), highest, section, problem, wood, tree.up, unit)
+    far, in_rows = loose_points(tree)
     if traced_share > MOST_TRACED:
-        doubts += (f"{100 * traced_share:.0f} % of the length {NEEDS_LEAF_OFF}",)
+        cause = "needs more points" if in_rows > LEAST_IN_ROWS else "or leaves: needs leaf-off, or more points"
+        doubts += (f"{100 * traced_share:.0f} % of the length {NO_SURFACE}, {cause}",)
+    elif far > MOST_FAR and in_rows <= LEAST_IN_ROWS:
+        doubts += (f"{100 * far:.0f} % of the points are far from the wood, and in no rows: leaves: needs leaf-off",)
     for doubt in doubts:
         warnings.warn(doubt, SkeletonWarning, stacklevel=2)
     return TreeMeasures(

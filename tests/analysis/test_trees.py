@@ -444,3 +444,27 @@ def test_a_tree_that_is_mostly_traced_needs_leaf_off():
     trunk = stem_shell(0.15, 3.0, 6000, np.random.default_rng(3))
     with pytest.warns(SkeletonWarning, match="60 % of the length has no surface.* needs leaf-off"):
         tree_measures(replace(trunk, confidence=(np.arange(31) < 10).astype(float)), 0, up="z")
+
+
+def with_leaves(bare, size, share, seed):
+    """Points of discs at random places up to 20 cm from the thinner half of a tree, so many for each of its own."""
+    rng = np.random.default_rng(seed)
+    thin = bare.edges[bare.radii[bare.edges].max(axis=1) < np.median(bare.radii)]
+    n, k = int(share * len(bare.points)), int(share * len(bare.points) / 20)
+    a, b = bare.nodes[thin[rng.integers(len(thin), size=k)]].swapaxes(0, 1)
+    middle = a + rng.random((k, 1)) * (b - a) + 0.1 * rng.normal(size=(k, 3))
+    axes = np.linalg.qr(rng.normal(size=(k, 3, 3)))[0][:, :2]
+    leaf, turn, far = rng.integers(k, size=n), 2 * np.pi * rng.random(n), size * np.sqrt(rng.random(n))
+    across = np.stack([far * np.cos(turn), far * np.sin(turn)], axis=1)
+    return np.concatenate([bare.points, middle[leaf] + (across[:, :, None] * axes[leaf]).sum(axis=1)])
+
+
+@quiet
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("forks", [2, 4])
+@pytest.mark.parametrize(("size", "share"), [(0.03, 0), (0.03, 0.4), (0.02, 1), (0.05, 2)])
+def test_leaves_are_told_from_bare_twigs(size, share, forks, seed):
+    bare = samples.tree(12000, forks=forks, length=2, radius=0.1, seed=seed, noise=0.0005 * seed)
+    points = with_leaves(bare, size, share, seed) if share else bare.points
+    doubts = tree_measures(pipelines.tree()(points)).doubts
+    assert any("needs leaf-off" in doubt for doubt in doubts) == (share > 0)
