@@ -129,9 +129,9 @@ def scan(seed: int) -> tuple[samples.Sample, np.ndarray, int]:
 def leafy(seed: int) -> tuple[np.ndarray, float]:
     """A tree of 4 to 14 m, of every second seed with leaves, and the share of the points that these have.
 
-    Leaves are discs of 1 to 5 cm, at most 5 to 25 cm from limbs of the thinner half. Their surface is 0.1 to 6 times that
-    of the wood, and as dense in points, of which there are 500 to 5000 per square metre with 0.5 to 4 mm of noise. Three
-    scanners see the wood of every third tree.
+    Leaves are discs of 1 to 5 cm, at most 5 to 25 cm from limbs of the thinner half. Their surface is 0.1 to 6 times
+    that of the wood, and as dense in points, of which there are 500 to 5000 per square metre with 0.5 to 4 mm of noise.
+    Three scanners see the wood of every third tree.
     """
     rng = np.random.default_rng([seed, 8])
     height = rng.uniform(4, 14)
