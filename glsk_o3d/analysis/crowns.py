@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
+from ..geometry.groups import quantile
 from ..geometry.neighbourhoods import nearest_neighbours, principal
 from ..geometry.vectors import TINY
 from .stems import Stem
@@ -80,8 +81,8 @@ def loose_points(tree: Stem) -> tuple[float, float]:
     is_off = off > OFF_WOOD * place.radius
     if not is_off.any() or not on_stem[asked].any() or len(rows) < ROW_POINTS:
         return np.nan, np.nan
-    # 1.4826 median absolute deviations are a standard deviation
-    is_far = is_off & (off > FAR_DEVIATIONS * 1.4826 * np.median(off[on_stem[asked]]))
+    # a quarter of normal deviations is below 0.3186 standard deviations; leaves around the stem have larger ones
+    is_far = is_off & (off > FAR_DEVIATIONS * quantile(off[on_stem[asked]], 0.25) / 0.3186)
     beside = nearest_neighbours(points, ROW_POINTS, of=skeleton.points[asked[is_off]])[1]
     _, middle, most = principal(points, beside)[0].T
     return float(is_far.mean()), float((1 - np.sqrt(middle / np.maximum(most, TINY))).mean())
