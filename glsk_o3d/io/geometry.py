@@ -139,7 +139,7 @@ def to_voxels(skeleton: Skeleton, size: float) -> Any:
     counts = np.ceil((high - low) / size)
     if counts.prod() > MOST_VOXELS:
         raise InvalidParameterError(f"size = {size:g}: there would be {counts.prod():.3g} voxels: take larger ones")
-    places = low + size * (np.stack(np.indices(counts.astype(int).tolist()), axis=-1).reshape(-1, 3) + 0.5)
+    places = low + size * (np.argwhere(np.ones(counts.astype(int), bool)) + 0.5)
     geometry, vectors = import_open3d().geometry, import_open3d().utility.Vector3dVector
     inside = geometry.PointCloud(vectors(places[skeleton.nearest(places).clearance <= 0]))
     return geometry.VoxelGrid.create_from_point_cloud_within_bounds(inside, size, low, low + size * counts)

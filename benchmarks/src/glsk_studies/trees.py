@@ -65,10 +65,10 @@ def stems(trees: Trees = 36, jobs: Jobs = 2, output: Output = None, page: Page =
 
 
 @app.command()
-def leaves(trees: Trees = 60, jobs: Jobs = 2, output: Output = None, page: Page = None) -> None:
+def leaves(trees: Trees = 60, jobs: Jobs = 2, output: Output = None) -> None:
     """Doubts of trees that have leaves, or none."""
     work = [(dict(tree=seed), (seed,)) for seed in range(trees)]
-    publish(run(forest.measure_leaves, work, jobs), forest.leaf_tables, output, page, "leaves")
+    publish(run(forest.measure_leaves, work, jobs), forest.leaf_tables, output)
 
 
 @app.command()
