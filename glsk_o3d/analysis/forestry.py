@@ -22,7 +22,7 @@ MOST_ERROR = 0.05  # derived: of the diameter at 1.3 m, a tenth of the wood
 MOST_TRACED = 0.5  # derived: of the length; above that the volume says nothing of most of the tree
 MOST_FAR = 0.05  # fitted: of the points, far from the surface of bare wood
 LEAST_IN_ROWS = 0.55  # fitted: how much points off the wood are in rows, of bare twigs; those of leaves are less
-NO_SURFACE = "has no surface, and no volume: twigs thinner than the points are apart"
+WITHOUT_SURFACE = "has no surface, and no volume: twigs thinner than the points are apart"
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
     far, in_rows = loose_points(tree)
     if traced_share > MOST_TRACED:
         cause = "needs more points" if in_rows > LEAST_IN_ROWS else "or leaves: needs leaf-off, or more points"
-        doubts += (f"{100 * traced_share:.0f} % of the length {NO_SURFACE}, {cause}",)
+        doubts += (f"{100 * traced_share:.0f} % of the length {WITHOUT_SURFACE}, {cause}",)
     elif far > MOST_FAR and in_rows <= LEAST_IN_ROWS:
         doubts += (f"{100 * far:.0f} % of the points are far from the wood, and in no rows: leaves: needs leaf-off",)
     for doubt in doubts:
