@@ -124,6 +124,9 @@ class Refiner(Filter[Skeleton, Skeleton]):
             curve = fit_axis(level_wide_ends(curve, surface), self.recentre + 1, surface, settle=True)
             size = curve.binary_size  # fourth powers of lengths must not overflow
             curve = regrow_ends(move_junctions(curve.scaled(1 / size)), self.ends == "surface").scaled(size)
+            if _may_be_asked(curve):
+                n_facing, facing = surface.facing(curve)
+                curve = curve.with_facts(n_facing=n_facing, facing=facing)
         return measured(deferred.put_back(curve) if deferred else curve)
 
     def fitted(self, curve: Curve) -> tuple[Curve, Surface]:
