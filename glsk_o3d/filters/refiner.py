@@ -1,7 +1,7 @@
 """Refiner: raw graph -> one-dimensional, medial skeleton (Wen et al. 2024, section II-D)."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from ..curve.axis.fit import fit_axis, pull_back_detached
@@ -105,6 +105,11 @@ class Refiner(Filter[Skeleton, Skeleton]):
 
     def run(self, skeleton: Skeleton, context: RunContext) -> Skeleton:
         curve = Curve.of(skeleton)
+        if skeleton.report.on_medial_axis and self.handle < 1:  # the solid has answered
+            return replace(self, handle=0, air=0, bridge=0)._run(curve)
+        return self._run(curve)
+
+    def _run(self, curve: Curve) -> Skeleton:
         if not self.recentre:  # every point keeps its vertex
             return self._in_order(curve).to_skeleton()
         refined = on_points(self._in_order, curve, surface_sample(curve))
