@@ -16,6 +16,7 @@ from ..geometry.numbers import fitted
 from ..geometry.vectors import TINY, dot
 from ..geometry.winding import AREA_NEIGHBOURS, point_areas
 from ..interop.poisson import inside_of, poisson_mesh
+from .numbers import CURVE
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,11 @@ class ClosedNumbers:
 
     open: float = fitted(0.03, "length of the sum of all normals over their area, from which a surface is not closed")
     turned: float = fitted(0.015, "share of flat links between opposite normals, from which signs are wrong")
-    noisy: float = fitted(0.3, "mean share of noise from which so many are turned by it, and at a tenth of it a tenth")
+    noisy: float = fitted(0.3, "mean share of noise from which so many are turned, and with less of it fewer")
+    least_turned: float = fitted(0.1, "share of them without noise")
+    enough: int = fitted(
+        2000, "points from which a patch is seen; in fewer it must be larger, as contraction oversteps"
+    )
     most_shut: float = fitted(0.2, "share of a surface that can be walls of shut holes; where more is, signs are wrong")
 
 
@@ -69,17 +74,27 @@ class OrientedSurface:
         points, rings = state.cloud[state.survivors], state.rings
         outward = outward_normals(points, state.normals[state.survivors], rings)
         areas = point_areas(points, nearest_neighbours(points, min(AREA_NEIGHBOURS + 1, len(points)))[1])
-        faces_its_place = dot(points - state.positions, outward) < 0
+        faces, count = (dot(points - state.positions, outward) < 0)[:, None].astype(float), rings.sizes[:, None]
+        for _ in range(2):  # in patches: noise turns some here and there
+            faces = (faces + count * rings.mean_over(faces)) / (1 + count)
         cosine = dot(outward[rings.centres], outward[rings.indices])
         flat = np.abs(cosine) * uprightness(points, outward, rings.centres, rings.indices)
-        shut, turned = areas[faces_its_place].sum() / areas.sum(), flat[cosine < 0].sum() / max(flat.sum(), TINY)
+        shut, turned = (
+            areas[faces[:, 0] > CURVE.majority].sum() / areas.sum(),
+            flat[cosine < 0].sum() / max(flat.sum(), TINY),
+        )
         return cls(points, outward, areas, state.report.noise, float(shut), float(turned))
+
+    @property
+    def shut_for_certain(self) -> float:
+        """The same, less of few points, whose contraction oversteps."""
+        return self.shut * min(len(self.points) / CLOSED.enough, 1)
 
     @property
     def is_closed(self) -> bool:
         """Whether the whole surface is seen, so that its normals cancel out (Gauss), and their signs are right."""
         openness = np.linalg.norm(self.areas @ self.outward) / self.areas.sum()
-        turned = CLOSED.turned * np.clip(self.noise / CLOSED.noisy, 0.1, 1)
+        turned = CLOSED.turned * np.clip(self.noise / CLOSED.noisy, CLOSED.least_turned, 1)
         return bool(openness < CLOSED.open and self.turned < turned and self.shut < CLOSED.most_shut)
 
     def medial_graph(self) -> MedialGraph:

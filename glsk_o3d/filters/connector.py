@@ -102,7 +102,7 @@ class Connector(Filter[Contraction, Skeleton]):
     def _with_holes(self, state: Contraction, contracted: Skeleton, radius: float) -> Skeleton:
         """The graph on the medial axis of the solid, if contraction has shut holes of it, or if no share is needed."""
         surface = OrientedSurface.of(state)
-        if self.shut and not (surface.is_closed and surface.shut >= self.shut * (1 + state.report.noise)):
+        if self.shut and not (surface.is_closed and surface.shut_for_certain >= self.shut):
             return contracted
         curve = surface.medial_graph()
         if len(curve.places) == 0:

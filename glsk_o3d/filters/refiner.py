@@ -126,7 +126,8 @@ class Refiner(Filter[Skeleton, Skeleton]):
         if asks and _may_be_asked(curve):
             curve, surface, deferred = self._decided(curve, surface.oriented(curve))
         if self.recentre and len(curve.vertices):
-            curve = fit_axis(level_wide_ends(curve, surface), self.recentre + 1, surface, settle=True)
+            if not curve.report.on_medial_axis:
+                curve = fit_axis(level_wide_ends(curve, surface), self.recentre + 1, surface, settle=True)
             size = curve.binary_size  # fourth powers of lengths must not overflow
             curve = regrow_ends(move_junctions(curve.scaled(1 / size)), self.ends == "surface").scaled(size)
         return measured(deferred.put_back(curve) if deferred else curve)
@@ -190,7 +191,7 @@ class Refiner(Filter[Skeleton, Skeleton]):
     def _centred(self, curve: Curve, surface: Surface) -> Curve:
         if self.spacing:
             curve = subdivide_edges(curve, self.spacing)
-        return fit_axis(curve, self.recentre, surface)
+        return curve if curve.report.on_medial_axis else fit_axis(curve, self.recentre, surface)
 
 
 def _may_be_asked(curve: Curve) -> bool:

@@ -26,8 +26,8 @@ class MedialNumbers:
 
 
 MEDIAL = MedialNumbers()
-CORNERS = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]  # of the triangles of a tetrahedron
-SIDES = [[0, 1], [0, 2], [1, 2]]  # of a triangle
+CORNERS = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]  # derived: of the triangles of a tetrahedron
+SIDES = [[0, 1], [0, 2], [1, 2]]  # derived: of a triangle
 
 
 @dataclass(frozen=True, eq=False)
