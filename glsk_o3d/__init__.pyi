@@ -32,7 +32,6 @@ from .errors import (
 from .filters.connector import Connector
 from .filters.contractor import Contractor
 from .filters.denoiser import Denoiser
-from .filters.inscriber import Inscriber
 from .filters.lpr_reducer import LPRReducer
 from .filters.outlier_remover import OutlierRemover
 from .filters.refiner import Refiner
@@ -70,7 +69,6 @@ __all__ = [
     "FileFormatError",
     "Filter",
     "GlskError",
-    "Inscriber",
     "InvalidCloudError",
     "InvalidParameterError",
     "IterationRecord",

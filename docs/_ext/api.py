@@ -41,7 +41,6 @@ NAMES = {
     "filters": {
         "Preparing a cloud": ("Sampler", "OutlierRemover", "Denoiser", "Thinner"),
         "The five filters": ("RingBuilder", "Contractor", "LPRReducer", "Connector", "Refiner"),
-        "Narrow holes": ("Inscriber",),
         "Thin parts and trees": ("Tracer",),
         "When to stop": ("ExplainedScore", "RingSizeRatio"),
     },

@@ -137,6 +137,8 @@ class Report:
         distinct points of the sample, and contracted points.
     noise : float
         Mean share of noise of the neighbourhoods, from 0 to 1.
+    on_medial_axis : bool
+        Whether the graph is that of the medial axis, whose loops and pieces are those of the solid.
     n_loops_closed, n_cuts, n_bridges : int
         Probable non-handles that were closed, branches that were cut because they probably cross air, and bridged gaps.
     n_facing, facing : int, float
@@ -186,6 +188,7 @@ class Report:
     n_distinct: int = 0
     n_contracted: int = 0
     noise: float = 0.0
+    on_medial_axis: bool = False
     n_loops_closed: int = 0
     n_cuts: int = 0
     n_bridges: int = 0
