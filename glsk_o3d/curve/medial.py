@@ -8,12 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ..data.contraction import Contraction
-from ..geometry.groups import component_labels
+from ..errors import InvalidCloudError
+from ..geometry.groups import component_labels, group_sum
 from ..geometry.inscribed_balls import outward_normals
 from ..geometry.medial_axis import Burnt, MedialAxis, medial_curve
 from ..geometry.neighbourhoods import nearest_neighbours, spacing, uprightness
 from ..geometry.numbers import fitted
-from ..geometry.vectors import TINY, dot
+from ..geometry.vectors import TINY, dot, norm
 from ..geometry.winding import AREA_NEIGHBOURS, point_areas
 from ..interop.poisson import inside_of, poisson_mesh
 from .numbers import CURVE
@@ -56,6 +57,23 @@ class MedialGraph(NamedTuple):
         ends = np.sort(part[self.edges[~same]], axis=1)
         return part, np.unique(ends, axis=0)
 
+    @classmethod
+    def of(cls, points: np.ndarray, outward: np.ndarray) -> MedialGraph:
+        """That of the closed surface through points (n, 3); the largest ball where the axis burns down to one place.
+
+        InvalidCloudError where no surface goes through the points.
+        """
+        mesh = poisson_mesh(points, outward, spacing(points))
+        vertices, triangles = np.asarray(mesh.vertices), np.asarray(mesh.triangles)
+        axis = MedialAxis.of(vertices, inside_of(mesh))
+        if len(axis.places) == 0:
+            raise InvalidCloudError(f"the surface through {len(points)} points has no inside")
+        curve = medial_curve(axis, Burnt.of(axis), vertices)
+        used, edges = np.unique(curve, return_inverse=True)
+        if len(curve) == 0:
+            used = np.array([axis.radii.argmax()])
+        return cls(axis.places[used], axis.radii[used], edges.reshape(-1, 2), genus(len(vertices), triangles))
+
 
 @dataclass(frozen=True, eq=False)
 class OrientedSurface:
@@ -64,6 +82,7 @@ class OrientedSurface:
     points: np.ndarray  # (n, 3)
     outward: np.ndarray  # (n, 3) unit normals
     areas: np.ndarray  # (n,) that each point stands for
+    piece: np.ndarray  # (n,) that each point belongs to, by links of neighbours
     noise: float  # mean share of noise of the neighbourhoods
     shut: float  # share of the surface that faces the place to which it was contracted: walls of holes that were shut
     turned: float  # share of links of neighbours, by how flat the surface is there, between opposite normals
@@ -77,13 +96,12 @@ class OrientedSurface:
         faces, count = (dot(points - state.positions, outward) < 0)[:, None].astype(float), rings.sizes[:, None]
         for _ in range(2):  # in patches: noise turns some here and there
             faces = (faces + count * rings.mean_over(faces)) / (1 + count)
+        piece = component_labels(len(points), np.column_stack([rings.centres, rings.indices]))
         cosine = dot(outward[rings.centres], outward[rings.indices])
         flat = np.abs(cosine) * uprightness(points, outward, rings.centres, rings.indices)
-        shut, turned = (
-            areas[faces[:, 0] > CURVE.majority].sum() / areas.sum(),
-            flat[cosine < 0].sum() / max(flat.sum(), TINY),
-        )
-        return cls(points, outward, areas, state.report.noise, float(shut), float(turned))
+        shut = float(areas[faces[:, 0] > CURVE.majority].sum() / areas.sum())
+        turned = float(flat[cosine < 0].sum() / max(flat.sum(), TINY))
+        return cls(points, outward, areas, piece, state.report.noise, shut, turned)
 
     @property
     def shut_for_certain(self) -> float:
@@ -93,17 +111,22 @@ class OrientedSurface:
     @property
     def is_closed(self) -> bool:
         """Whether the whole surface is seen, so that its normals cancel out (Gauss), and their signs are right."""
-        openness = np.linalg.norm(self.areas @ self.outward) / self.areas.sum()
+        sums = group_sum(self.areas[:, None] * self.outward, self.piece, self.piece.max() + 1)
+        openness = norm(sums).sum() / self.areas.sum()
         turned = CLOSED.turned * np.clip(self.noise / CLOSED.noisy, CLOSED.least_turned, 1)
         return bool(openness < CLOSED.open and self.turned < turned and self.shut < CLOSED.most_shut)
 
     def medial_graph(self) -> MedialGraph:
-        """The curve on the medial axis of the closed surface through the points."""
-        mesh = poisson_mesh(self.points, self.outward, spacing(self.points))
-        vertices, triangles = np.asarray(mesh.vertices), np.asarray(mesh.triangles)
-        axis = MedialAxis.of(vertices, inside_of(mesh))
-        used, edges = np.unique(medial_curve(axis, Burnt.of(axis), vertices), return_inverse=True)
-        return MedialGraph(axis.places[used], axis.radii[used], edges.reshape(-1, 2), genus(len(vertices), triangles))
+        """The curves on the medial axes of the closed surfaces through the points of each piece.
+
+        InvalidCloudError where no surface goes through one of them.
+        """
+        pieces = [self.piece == piece for piece in range(self.piece.max() + 1)]
+        graphs = [MedialGraph.of(self.points[piece], self.outward[piece]) for piece in pieces]
+        places, radii, edges, handles = zip(*graphs, strict=True)
+        first = np.cumsum([0, *map(len, places[:-1])])
+        shifted = np.concatenate([part + start for part, start in zip(edges, first, strict=True)])
+        return MedialGraph(np.concatenate(places), np.concatenate(radii), shifted, sum(handles))
 
 
 def genus(n: int, triangles: np.ndarray) -> int:

@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 from ..curve.medial import OrientedSurface
 from ..data.contraction import Contraction
 from ..data.skeleton import Skeleton
+from ..errors import InvalidCloudError
 from ..geometry.farthest_point import farthest_point_sampling
 from ..geometry.groups import group_median, group_sum
 from ..geometry.neighbourhoods import nearest_neighbours, row_medians
@@ -81,7 +82,7 @@ class Connector(Filter[Contraction, Skeleton]):
         0.01,
         "Least share of a closed surface that faces the place to which it was contracted, as walls of narrow holes do "
         "when these are shut, for the graph to be the curve on the medial axis of the solid instead, if that has "
-        "loops. 0 takes it always, 1 never.",
+        "loops. 0 takes it of any closed surface, 1 never.",
         low=0,
         high=1,
     )
@@ -100,19 +101,21 @@ class Connector(Filter[Contraction, Skeleton]):
         return graph if self.shut == 1 else self._with_holes(state, graph, np.median(radius))
 
     def _with_holes(self, state: Contraction, contracted: Skeleton, radius: float) -> Skeleton:
-        """The graph on the medial axis of the solid, if contraction has shut holes of it, or if no share is needed."""
+        """The graph on the medial axis of the solid, if there is one and contraction has shut enough of its holes."""
         surface = OrientedSurface.of(state)
-        if self.shut and not (surface.is_closed and surface.shut_for_certain >= self.shut):
+        if not surface.is_closed or surface.shut_for_certain < self.shut:
             return contracted
-        curve = surface.medial_graph()
-        if len(curve.places) == 0:
+        try:
+            curve = surface.medial_graph()
+        except InvalidCloudError:  # a piece has too few points
             return contracted
         balls = np.maximum(radius, self.thickness * curve.radii)
         part, edges = curve.merged(farthest_point_sampling(curve.places, balls)[1])
-        vertices = group_sum(curve.places, part, part.max() + 1) / np.bincount(part)[:, None]
+        mean = group_sum(np.column_stack([curve.places, curve.radii]), part, part.max() + 1)
+        mean /= np.bincount(part)[:, None]
         vertex_of_row = part[cKDTree(curve.places).query(state.cloud)[1]]
         is_sound = curve.n_loops == curve.genus  # where tetrahedra cross the surface there are false loops
-        graph = raw_graph(state, vertices, edges, vertex_of_row, on_medial_axis=is_sound)
+        graph = raw_graph(state, mean[:, :3], edges, vertex_of_row, mean[:, 3], on_medial_axis=is_sound)
         return graph if graph.n_loops or not self.shut else contracted
 
     def _edges(self, state: Contraction, vertex_of_survivor: np.ndarray) -> np.ndarray:
@@ -136,9 +139,17 @@ def contraction_distance(state: Contraction) -> np.ndarray:
 
 
 def raw_graph(
-    state: Contraction, vertices: np.ndarray, edges: np.ndarray, vertex_of_row: np.ndarray, on_medial_axis: bool = False
+    state: Contraction,
+    vertices: np.ndarray,
+    edges: np.ndarray,
+    vertex_of_row: np.ndarray,
+    radii: np.ndarray | float = 0.0,
+    on_medial_axis: bool = False,
 ) -> Skeleton:
-    """The skeleton with vertices (M, 3) in the working frame, to which the rows of the cloud belong."""
+    """The skeleton with vertices (M, 3) in the working frame, to which the rows of the cloud belong.
+
+    Vertices to which none belongs have the `radii` (M,), in the same frame.
+    """
     vertices, vertex_of_point = state.frame.out_of(vertices), state.map.to_points(vertex_of_row)
     # copies, and what a sample stands for, count with one point
     once = np.where(state.map.sampled, vertex_of_point, -1)
@@ -147,7 +158,7 @@ def raw_graph(
     return Skeleton(
         vertices=vertices,
         edges=edges,
-        radii=plane_distance_radii(vertices, once, state.points, normals),
+        radii=plane_distance_radii(vertices, once, state.points, normals, radii * state.frame.scale),
         vertex_of_point=vertex_of_point,
         points=state.points,
         normals=normals,

@@ -5,20 +5,30 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import InvalidCloudError
 from .clouds import to_point_cloud
 from .packages import import_open3d
 
 CELL = 1.25  # measured: side of the octree's cells, in spacings: smaller ones follow noise, larger ones close holes
+LEAST_CELLS = 4  # derived: across a surface: the octree is at least two deep
 FULL_DEPTH = 4  # speed: of the octree, down to which it is a full grid
 RAYS = 3  # measured: from each place, of which most decide: one may meet an edge
 
 
 def poisson_mesh(points: np.ndarray, outward: np.ndarray, spacing: float) -> Any:
-    """A closed mesh near points (n, 3) with outward normals, as an Open3D mesh (Kazhdan and Hoppe 2013)."""
+    """A closed mesh near points (n, 3) with outward normals, as an Open3D mesh (Kazhdan and Hoppe 2013).
+
+    InvalidCloudError where no surface goes through them.
+    """
+    if CELL * spacing > np.ptp(points, axis=0).max() / LEAST_CELLS:
+        raise InvalidCloudError(f"{len(points)} points are too few for a surface to be reconstructed")
     o3d, cloud = import_open3d(), to_point_cloud(points)
     cloud.normals = o3d.utility.Vector3dVector(outward)
     octree = dict(depth=0, width=CELL * spacing, full_depth=FULL_DEPTH, linear_fit=True, n_threads=1)
-    mesh, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, **octree)
+    try:
+        mesh, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, **octree)
+    except RuntimeError as error:
+        raise InvalidCloudError(f"no surface can be reconstructed through {len(points)} points") from error
     return mesh
 
 

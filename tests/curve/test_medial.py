@@ -4,8 +4,8 @@ import numpy as np
 import open3d as o3d
 import pytest
 
-from glsk_o3d import Contractor, pipelines, samples
-from glsk_o3d.curve.medial import OrientedSurface, genus
+from glsk_o3d import Contractor, InvalidCloudError, pipelines, samples
+from glsk_o3d.curve.medial import MedialGraph, OrientedSurface, genus
 
 
 def surface_of(points):
@@ -66,3 +66,18 @@ def test_genus_counts_handles_of_all_parts():
     meshes = {0: ball, 1: ring, 2: ring + o3d.geometry.TriangleMesh.create_torus().translate((9, 0, 0)) + ball}
     for handles, mesh in meshes.items():
         assert genus(len(mesh.vertices), np.asarray(mesh.triangles)) == handles
+
+
+def test_open_pieces_do_not_close_each_other():
+    """Their normals would cancel out."""
+    low = samples.torus(4000).points
+    low = low[low[:, 2] < 0]
+    assert not surface_of(np.concatenate([low, low * [1, 1, -1] + [0, 0, 1.0]])).is_closed
+
+
+def test_where_no_surface_goes_through_points_there_is_an_error():
+    rng = np.random.default_rng(0)
+    for n in (4, 8):
+        points = rng.normal(size=(n, 3))
+        with pytest.raises(InvalidCloudError, match=f"{n} points are too few"):
+            MedialGraph.of(points, points / np.linalg.norm(points, axis=1)[:, None])

@@ -157,3 +157,49 @@ def test_the_medial_axis_can_be_had_of_any_solid(assert_sound):
     assert_sound(ring, len(points), triangles=True)
     assert ring.n_loops == 1
     np.testing.assert_allclose(np.linalg.norm(ring.vertices[:, :2], axis=1), 0.4, atol=0.02)
+
+
+def with_another(points, other, offset):
+    """Both, the other one along x."""
+    return np.concatenate([points, other + [offset, 0, 0]])
+
+
+def cube(n, seed=0):
+    """Points on a cube of side 1."""
+    rng = np.random.default_rng(seed)
+    points, axis = rng.random((n, 3)), rng.integers(0, 3, n)
+    points[np.arange(n), axis] = rng.integers(0, 2, n)
+    return points
+
+
+def test_an_object_without_a_curve_beside_one_with_shut_holes_is_kept(assert_sound):
+    """The medial axis of a cube burns down to one place."""
+    points = with_another(plate(0.5, 1.0), cube(500), 12)
+    graph = Connector()((pipelines.rings() | Contractor())(points))
+    assert_sound(graph, len(points), triangles=True)
+    assert (graph.n_components, graph.n_loops, graph.report.on_medial_axis) == (2, 3, True)
+    own = graph.vertices[graph.vertex_of_point[4096:]]
+    assert np.abs(own - points[4096:].mean(axis=0)).max() < 0.5
+
+
+def test_objects_far_apart_keep_their_holes(assert_sound):
+    """One octree around both would have no end."""
+    points = with_another(plate(0.5, 1.0, seed=1), plate(0.5, 1.0, holes=1, seed=2), 1e4)
+    graph = Connector()((pipelines.rings() | Contractor())(points))
+    assert_sound(graph, len(points), triangles=True)
+    assert graph.n_components == 2
+    assert graph.n_loops >= 4
+    assert (graph.radii > 0).all()
+
+
+def test_without_a_closed_surface_there_is_no_medial_axis():
+    rng = np.random.default_rng(0)
+    flat = np.column_stack([rng.random((500, 2)), np.zeros(500)])
+    clouds = [np.outer(np.arange(n), [1.0, 2, 3]) for n in (8, 60, 300)]
+    clouds += [flat, *(rng.normal(size=(n, 3)) for n in (8, 12, 40)), samples.sheet(1000).points]
+    for points in clouds:
+        state = (pipelines.rings() | Contractor())(points)
+        contracted, either = Connector(shut=1)(state), Connector(shut=0)(state)
+        assert not either.report.on_medial_axis
+        np.testing.assert_array_equal(contracted.vertices, either.vertices)
+        np.testing.assert_array_equal(contracted.edges, either.edges)

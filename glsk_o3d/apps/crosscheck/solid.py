@@ -17,7 +17,6 @@ from ...interop.packages import import_open3d, require
 from ...interop.poisson import CELL, poisson_mesh
 
 SLIVER = 1e-12  # precision: of the mean area of triangles
-LEAST_CELLS = 4  # derived: across a surface: the octree is at least two deep
 REACH = 2.5  # fitted: cells from the nearest point: what is farther away is no surface
 LEAST_PART = 0.02  # fitted: of the area of the largest: smaller ones are bubbles
 BALL_RADII = (1.0, 2.0, 4.0)  # fitted: of the rolling balls, in spacings
@@ -100,11 +99,8 @@ def poisson(points: np.ndarray, outward: np.ndarray, edge: float) -> Solid:
 
     `edge` is the spacing that its cells go by. What is far from all points is left out, and so are small parts.
     """
-    cell = CELL * edge
-    if cell > np.ptp(points, axis=0).max() / LEAST_CELLS:
-        raise InvalidCloudError(f"{len(points)} points are too few for a surface to be reconstructed")
     mesh = poisson_mesh(points, outward, edge)
-    mesh.remove_vertices_by_mask(cKDTree(points).query(np.asarray(mesh.vertices))[0] > REACH * cell)
+    mesh.remove_vertices_by_mask(cKDTree(points).query(np.asarray(mesh.vertices))[0] > REACH * CELL * edge)
     return Solid.of(mesh, "poisson", least_part=LEAST_PART)
 
 
