@@ -104,17 +104,16 @@ class OrientedSurface:
         return cls(points, outward, areas, piece, state.report.noise, shut, turned)
 
     @property
-    def shut_for_certain(self) -> float:
-        """The same, less of few points, whose contraction oversteps."""
-        return self.shut * min(len(self.points) / CLOSED.enough, 1)
-
-    @property
     def is_closed(self) -> bool:
         """Whether the whole surface is seen, so that its normals cancel out (Gauss), and their signs are right."""
         sums = group_sum(self.areas[:, None] * self.outward, self.piece, self.piece.max() + 1)
         openness = norm(sums).sum() / self.areas.sum()
         turned = CLOSED.turned * np.clip(self.noise / CLOSED.noisy, CLOSED.least_turned, 1)
         return bool(openness < CLOSED.open and self.turned < turned and self.shut < CLOSED.most_shut)
+
+    def has_shut(self, share: float) -> bool:
+        """Whether it is closed and at least this share of it, of few points more, is walls of holes that were shut."""
+        return self.is_closed and self.shut * min(len(self.points) / CLOSED.enough, 1) >= share
 
     def medial_graph(self) -> MedialGraph:
         """The curves on the medial axes of the closed surfaces through the points of each piece.

@@ -103,7 +103,7 @@ class Connector(Filter[Contraction, Skeleton]):
     def _with_holes(self, state: Contraction, contracted: Skeleton, radius: float) -> Skeleton:
         """The graph on the medial axis of the solid, if there is one and contraction has shut enough of its holes."""
         surface = OrientedSurface.of(state)
-        if not surface.is_closed or surface.shut_for_certain < self.shut:
+        if not surface.has_shut(self.shut):
             return contracted
         try:
             curve = surface.medial_graph()
