@@ -226,6 +226,7 @@ class Report:
             ("stopped", f"{self.stop_reason}, after {len(self.iterations)} solves"),
             ("counts", ", ".join(f"{value} {name}" for name, value in counts.items() if value)),
             ("noise", f"{self.noise:.2f}"),
+            *([("graph", "on the medial axis of the solid")] if self.on_medial_axis else []),
             ("decisions", f"{len(self.decisions)}, {len(self.uncertain)} of them uncertain"),
             *(("uncertain", str(part)) for part in self.uncertain[:1]),
             *(("unsupported", str(part)) for part in self.unsupported[:1]),

@@ -102,3 +102,8 @@ def test_a_decision_says_what_became_of_it():
     assert all(it.outcome in str(it) for it in DECISIONS)
     other = [dataclasses.replace(it, changed=not it.changed).outcome for it in DECISIONS]
     assert other == ["loop closed", "branch kept", "gap bridged", "limb kept"]
+
+
+def test_a_report_says_that_the_graph_is_on_the_medial_axis(report):
+    assert "medial" not in str(report)
+    assert "graph       on the medial axis of the solid" in str(replace(report, on_medial_axis=True)).splitlines()
