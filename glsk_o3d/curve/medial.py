@@ -68,7 +68,9 @@ class MedialGraph(NamedTuple):
         axis = MedialAxis.of(vertices, inside_of(mesh))
         if len(axis.places) == 0:
             raise InvalidCloudError(f"the surface through {len(points)} points has no inside")
-        curve = medial_curve(axis, Burnt.of(axis), vertices)
+        if (burnt := Burnt.of(axis)).has_sheets:
+            raise InvalidCloudError(f"the solid of {len(points)} points has a cavity: sheets around it are no curve")
+        curve = medial_curve(axis, burnt, vertices)
         used, edges = np.unique(curve, return_inverse=True)
         if len(curve) == 0:
             used = np.array([axis.radii.argmax()])

@@ -115,6 +115,8 @@ class Burnt:
     ----------
     core : (e,) bool array
         Edges that cannot burn: they are on loops, or between loops.
+    has_sheets : bool
+        Whether faces are left: closed ones around a cavity have no border.
     times : (e,) float64 array
         When the last sheet at an edge had burnt: the half width of the solid across the curve there.
     onward : (p,) int64 array
@@ -122,6 +124,7 @@ class Burnt:
     """
 
     core: np.ndarray
+    has_sheets: bool
     times: np.ndarray
     onward: np.ndarray
 
@@ -135,7 +138,8 @@ class Burnt:
         fire = _Fire(axis)
         while fire.queue:
             fire.burn(*heapq.heappop(fire.queue))
-        return cls(np.array(fire.is_left, bool), np.array(fire.times), np.array(fire.onward, int))
+        core, has_sheets = np.array(fire.is_left, bool), any(fire.faces_of_edge)
+        return cls(core, has_sheets, np.array(fire.times), np.array(fire.onward, int))
 
 
 class _Fire:

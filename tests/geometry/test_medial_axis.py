@@ -113,3 +113,15 @@ def test_a_way_leads_from_the_tip_of_each_arm(seed):
     assert (np.linalg.norm(tips, axis=1) > 7).all()
     cosines = tips @ tips.T / np.linalg.norm(tips, axis=1)[:, None] / np.linalg.norm(tips, axis=1)
     assert (cosines.min(axis=1) < -0.85).all()  # another one is opposite, each anywhere across its arm
+
+
+def test_sheets_around_a_cavity_are_left():
+    filled = np.ones((9, 9, 9), bool)
+    points, is_inside = cubes(filled)
+    axis = MedialAxis.of(points, is_inside)
+    assert not Burnt.of(axis).has_sheets
+    filled[3:6, 3:6, 3:6] = False
+    points, is_inside = cubes(filled)
+    axis = MedialAxis.of(points, is_inside)
+    assert len(axis.places) - len(axis.edges) + len(np.unique(axis.face_edges[:, 0])) == 2  # Euler's number of a shell
+    assert Burnt.of(axis).has_sheets

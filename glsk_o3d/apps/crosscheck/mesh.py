@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from ...data.contraction import Contraction, at_rest
 from ...data.skeleton import Skeleton
 from ...errors import SkeletonWarning
+from ...filters.connector import Connector
 from ...filters.contractor import Contractor
 from ...filters.lpr_reducer import LPRReducer
 from ...filters.refiner import Refiner
@@ -36,6 +37,7 @@ def mesh_skeleton(solid: Solid, pipeline: Pipeline[Any, Any]) -> Skeleton:
     contractor = replace(stages[0], reducer=None)
     rest = [stage for stage in stages[1:] if not isinstance(stage, LPRReducer)]
     rest = [replace(stage, bridge=0) if isinstance(stage, Refiner) else stage for stage in rest]
+    rest = [replace(stage, shut=1) if isinstance(stage, Connector) else stage for stage in rest]  # its own opinion
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SkeletonWarning)
         state, faces = mesh_state(solid)
