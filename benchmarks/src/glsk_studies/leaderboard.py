@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from statistics import median
 from typing import Annotated
@@ -36,6 +37,7 @@ KEPT_AFTER = 20  # skeletons, so that little is lost when a run is stopped
 PRELOADED = ("glsk_o3d.pipelines", "glsk_o3d.filters.refiner", "glsk_o3d.io.scans", "glsk_o3d.viewing.preview")
 PRELOADED += ("glsk_bench.scoring", "glsk_bench.making", "glsk_bench.table", "open3d", "typer", "trimesh", "skeletor")
 PRELOADED += ("pc_skeletor", "pygel3d.graph", "compas_cgal.skeletonization", "compas_cgal.meshing", "skan")
+PRELOADED += ("glsk_studies.leaderboard",)  # which each process loads anew otherwise
 IMAGES = ROOT / "docs" / "images"
 PARTS = {  # of pages, by the version of the benchmark
     "v1": (
@@ -65,14 +67,29 @@ def run_(
     limit: Limit = 60.0,
     jobs: Jobs = 2,
     version: Version = "v1",
-    part: Annotated[bool, typer.Option("--part", help="Take DIR/bench as it is, though it lacks some clouds.")] = False,
 ) -> None:
     """Run tools over the whole benchmark, or go on where it was left, and keep their scores in benchmarks/VERSION."""
     peers = installed(PEERS, tool)
-    bench = read_folder(place / BENCH) if part else make(place / BENCH, version, jobs=jobs)
+    bench = make(place / BENCH, version, jobs=jobs)
     for name, made in answered(bench, place, peers, limit, jobs):
-        results = score_answers(bench, place / name, name=name)
-        typer.echo(f"{board.keep_scores(results, made)}: {results.failures} failures")
+        keep_scores(bench, place / name, made)
+
+
+@app.command("keep")
+def keep_(place: Place, tool: Tool = "") -> None:
+    """Keep the scores of what has been run so far, of all shapes that have all their answers."""
+    bench = read_folder(place / BENCH)
+    for name in installed(PEERS, tool):
+        if (place / name / TIMES_NAME).is_file():
+            lacking = {it.shape for it in bench.scored if it.name not in read_times(place / name)}
+            shapes = {shape: told for shape, told in bench.shapes.items() if shape not in lacking}
+            keep_scores(replace(bench, shapes=shapes), place / name, read(place / name / TIMES_NAME)["made"])
+
+
+def keep_scores(bench: BenchmarkFolder, answers: Path, made: dict) -> None:
+    """Score a tool's answers, keep that, and say so."""
+    results = score_answers(bench, answers)
+    typer.echo(f"{board.keep_scores(results, made)}: {results.failures} failures of {len(results.rows)} clouds")
 
 
 @app.command("repeat")
@@ -104,6 +121,7 @@ def answered(
     for name, peer in peers.items():
         made, times = begun(place / name, peer, limit)
         todo = [it for it in bench.scored if it.name not in times]
+        todo.sort(key=lambda it: bench.shapes[it.shape].get("seed", 0))  # so that a part has shapes of all families
         for first in range(0, len(todo), KEPT_AFTER):
             some = todo[first : first + KEPT_AFTER]
             work = [(dict(cloud=it.name), (it.path, peer, place / name / f"{it.name}.npz")) for it in some]
