@@ -239,6 +239,47 @@ def repeat(
 
 
 @app.command()
+def sheet(
+    folder: Folder,
+    answers: Answers,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="PNG", help="The picture; the raters' CSV is put beside it.")
+    ],
+    n: Annotated[int, typer.Option("--skeletons", metavar="N", min=1, help="Of clouds taken at random.")] = 24,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="The same takes the same clouds.")] = 0,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Draw skeletons for raters, and the table that each of them fills in: accept, edit or reject."""
+    with reporting(quiet=quiet, verbose=verbose):
+        from glsk_o3d.cli.outputs import PICTURE, Output, check_outputs
+
+        from .rating import draw_sheet
+
+        check_outputs([Output(output, *PICTURE, draw_sheet)])
+        clouds = draw_sheet(folder, answers, output, n=n, seed=seed)
+        files = [output, output.with_suffix(".csv")]
+        _tell({"clouds": clouds, "files": [str(path) for path in files]}, "", as_json, quiet, files)
+
+
+@app.command()
+def rates(
+    first: Annotated[Path, typer.Argument(metavar="CSV", help="The table of a sheet, filled in by one rater.")],
+    second: Annotated[Path, typer.Argument(metavar="CSV", help="The same by another.")],
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """The accept rates of two raters of a sheet, and Cohen's kappa."""
+    with reporting(quiet=quiet, verbose=verbose):
+        from .rating import rates as of_raters
+
+        told = of_raters(first, second)
+        _tell(told, {**told, "kappa": "-" if told["kappa"] is None else told["kappa"]}, as_json, quiet)
+
+
+@app.command()
 def table(
     scores: Annotated[list[Path], typer.Argument(metavar="SCORES...", help="What 'glsk benchmark score' wrote.")],
     output: Annotated[
