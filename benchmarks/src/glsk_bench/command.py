@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -257,8 +258,9 @@ def sheet(
 
         from .rating import draw_sheet
 
-        check_outputs([Output(output, *PICTURE, draw_sheet)])
-        clouds = draw_sheet(folder, answers, output, n=n, seed=seed)
+        draw = partial(draw_sheet, folder, n=n, seed=seed)
+        check_outputs([Output(output, *PICTURE, draw)])
+        clouds = draw(answers, output)
         files = [output, output.with_suffix(".csv")]
         _tell({"clouds": clouds, "files": [str(path) for path in files]}, "", as_json, quiet, files)
 

@@ -5,15 +5,17 @@ The README of the benchmarks says what each command shows.
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from statistics import median
 from typing import Annotated
 
 import typer
-from glsk_bench import BenchmarkFolder, leaderboard, make, read_folder, repeat, sample, score_answers
+from glsk_bench import BenchmarkFolder, make, read_folder, repeat, sample, score_answers
 from glsk_bench.clouds import cloud
 from glsk_bench.scoring import TIMES_NAME, read_times
 from glsk_bench.shapes import shape
@@ -28,7 +30,7 @@ from .board import Entry, kept, repeats, seconds
 from .peers import PEERS, Peer, installed, one_thread, silence, skeleton_of
 from .runs import Jobs, application, writable
 from .runs import run as in_processes
-from .tables import ROOT, Table, fill, machine, markdown, number, read, surroundings
+from .tables import ROOT, fill, machine, markdown, number, read, surroundings
 
 BENCH = "bench"  # the clouds, in the folder that a run is given; beside it a folder of answers for each tool
 TIMED = ("clean", "depth2")  # of the first shape of each family
@@ -39,24 +41,16 @@ PRELOADED += ("glsk_bench.scoring", "glsk_bench.making", "glsk_bench.table", "op
 PRELOADED += ("pc_skeletor", "pygel3d.graph", "compas_cgal.skeletonization", "compas_cgal.meshing", "skan")
 PRELOADED += ("glsk_studies.leaderboard",)  # which each process loads anew otherwise
 IMAGES = ROOT / "docs" / "images"
-PARTS = {  # of pages, by the version of the benchmark
-    "v1": (
-        *("short", "leaderboard", "losses", "unclear", "topologies", "errors", "families", "failures", "runs"),
-        "recorded",
-    ),
-    "v2": (
-        *("things-short", "things-leaderboard", "things-losses", "things-unclear", "things-topologies"),
-        *("things-errors", "things-hooks", "things-reach", "things-families", "things-families-hooks"),
-        *("things-failures", "things-runs", "things-repeat"),
-    ),
-}
-REPEATED = {"repeat": "things", "repeat-meshes": "meshes"}
-PICTURES = {"v1": "leaderboard", "v2": "leaderboard_things"}
+PARTS = (  # of pages; those of a kind of shapes begin with it
+    *("short", "leaderboard", "losses", "failures", "runs", "recorded", "repeat"),
+    *(f"{kind}-{part}" for kind in board.KINDS for part in ("leaderboard", "losses", "variants", "families")),
+)
+PICTURES = {"things": "leaderboard_things", "tubes": "leaderboard"}
 
 app = application(__doc__)
 Place = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the clouds and of all answers.")]
 Tool = Annotated[str, typer.Option("--tool", metavar="NAMES", help="With commas; else all that are installed.")]
-Version = Annotated[str, typer.Option("--version", metavar="NAME", help="Of the benchmark.")]
+Version = Annotated[str, typer.Option("--version", metavar="NAME", help="Of the benchmark: v3, things, or v1, tubes.")]
 Limit = Annotated[float, typer.Option("--limit", help="Seconds for a skeleton.")]
 
 
@@ -66,7 +60,7 @@ def run_(
     tool: Tool = "",
     limit: Limit = 60.0,
     jobs: Jobs = 2,
-    version: Version = "v1",
+    version: Version = "v3",
 ) -> None:
     """Run tools over the whole benchmark, or go on where it was left, and keep their scores in benchmarks/VERSION."""
     peers = installed(PEERS, tool)
@@ -100,12 +94,12 @@ def repeat_(
     draws: Annotated[int, typer.Option("--draws", min=2, help="Clouds of each object.")] = 5,
     limit: Limit = 60.0,
     jobs: Jobs = 2,
-    version: Version = "v2",
+    version: Version = "v3",
 ) -> None:
     """Run tools over several clouds of each object, and keep how far their answers are apart in benchmarks/VERSION."""
     objects = "things" if meshes is None else "meshes"
     folder, peers = place / f"repeat_{objects}", installed(PEERS, tool)
-    bench = sample(folder / BENCH, meshes, version=version, draws=draws)
+    bench = sample(folder / BENCH, meshes, version=version, draws=draws, double=True)
     for name, made in answered(bench, folder, peers, limit, jobs):
         found = repeat(bench, folder / name, name=name)
         where = board.keep_repeat(version, objects, found, made)
@@ -157,33 +151,44 @@ def answer(cloud: Path, peer: Peer, path: Path) -> dict:
 
 
 @app.command("seconds")
-def seconds_(tool: Tool = "", version: Version = "v1") -> None:
-    """CPU seconds of each tool on twelve clouds, one at a time; kept in benchmarks/VERSION. Let the machine be idle."""
+def seconds_(tool: Tool = "", version: Version = "v3") -> None:
+    """CPU seconds and memory of each tool on the first shapes, kept in benchmarks/VERSION. For an idle Linux."""
     peers = installed(PEERS, tool)
     where = machine()
     one_thread()
-    rows = in_processes(timed, [(dict(tool=name), (peer, version)) for name, peer in peers.items()], 1, fresh=True)
-    board.keep_seconds(
-        version, {row["tool"]: dict(cpu=round(row["cpu"], 3), where=where) for row in rows if "cpu" in row}
-    )
-    for row in rows:
-        typer.echo(f"{row['tool']}: " + (row["failure"] if "failure" in row else f"{row['cpu']:.2f} s"))
+    for name, peer in peers.items():
+        (row,) = in_processes(timed, [(dict(tool=name), (peer, version))], 1, fresh=True)
+        if "failure" in row:
+            typer.echo(f"{name}: {row['failure']}")
+            continue
+        board.keep_seconds(version, {name: dict(cpu=round(row["cpu"], 3), mb=round(row["mb"]), where=where)})
+        typer.echo(f"{name}: {row['cpu']:.2f} s, {row['mb']:.0f} MB")
 
 
 def timed(peer: Peer, version: str) -> dict:
-    """The median CPU seconds of a tool, after a first call."""
+    """The median CPU seconds of a tool, after a first call, and the MB that its calls take at most."""
     asked = VERSIONS[version]
-    shapes = [shape(family, asked.seeds[0]) for family in asked.families]
-    return dict(cpu=median(peer.timed(cloud(it, variant))[1] for it in shapes for variant in TIMED))
+    shapes = [shape(family, asked.seeds[0], steady=asked.steady) for family in asked.families]
+    clouds = [cloud(it, variant) for it in shapes for variant in TIMED if variant in asked.variants_of(it.name)]
+    with silence(), suppress(Exception):
+        peer.warm_up()
+    Path("/proc/self/clear_refs").write_text("5")  # so that VmHWM begins anew
+    before = memory("VmRSS")
+    spent = [peer.timed(points)[1] for points in clouds]
+    return dict(cpu=median(spent), mb=memory("VmHWM") - before)
+
+
+def memory(fact: str) -> float:
+    """What Linux says of this process [MB]: VmRSS, its memory now, or VmHWM, the most that it had."""
+    return int(re.search(rf"{fact}:\s*(\d+)", Path("/proc/self/status").read_text())[1]) / 1024
 
 
 def parts_of(path: Path) -> list[str]:
     """The tables for which a page has a place."""
     text = path.read_text(encoding="utf-8") if path.is_file() else ""
-    known = [name for names in PARTS.values() for name in names]
-    names = [name for name in known if f"<!-- {name} -->\n" in text]
+    names = [name for name in PARTS if f"<!-- {name} -->\n" in text]
     if not names:
-        raise typer.BadParameter(f"there is no page {path} with a line <!-- NAME -->: {', '.join(known)}")
+        raise typer.BadParameter(f"there is no page {path} with a line <!-- NAME -->: {', '.join(PARTS)}")
     return names
 
 
@@ -191,46 +196,40 @@ def parts_of(path: Path) -> list[str]:
 def page(paths: Annotated[list[Path] | None, typer.Argument(metavar="MD...")] = None) -> None:
     """The tables of what is kept, printed; or put into pages, with pictures in docs/images."""
     places = {path: parts_of(path) for path in paths or ()}
-    found = {}
-    for version in PARTS:
-        entries = kept(version)
-        rows = leaderboard(entry.results for entry in entries).entries if entries else []
-        found |= pieces(version, entries, rows)
-        if rows and places:
-            board.draw_board(rows, IMAGES, PICTURES[version])
+    entries = {kind: found for kind, version in board.KINDS.items() if (found := kept(version))}
+    rows = {kind: board.ranked(here) for kind, here in entries.items()}
+    found = pieces(entries, rows)
     if not places:
         typer.echo("\n".join(found.values()))
     for path, names in places.items():
         fill(path, {name: found[name] for name in names if name in found})
+    for kind in rows if places else ():
+        board.draw_board(rows[kind], IMAGES, PICTURES[kind])
 
 
-def pieces(version: str, entries: list[Entry], rows: list[dict]) -> dict[str, str]:
-    """What stands at the places of the pages, by their names; of what is kept, and its leaderboard's entries."""
-    found: dict[str, Table] = {}
-    if entries:
-        cpu, worse = seconds(version), board.worse(entries)
-        found = {
-            "short": board.short(rows, cpu),
-            "leaderboard": board.overview(rows, cpu),
-            "losses": board.losses(worse),
-            "unclear": board.unclear(worse),
-            "topologies": board.by_group(entries, "variant", "topology", 2, "right topology, by kind of cloud"),
-            "errors": board.by_group(entries, "variant", "error", 3, "error, by kind of cloud"),
-            "hooks": board.by_group(entries, "variant", "hooks", 2, "ends that are hooks, by kind of cloud"),
-            "reach": board.by_group(entries, "variant", "reach", 2, "reach, by kind of cloud"),
-            "families": board.by_group(entries, "family", "topology", 2, "right topology, by family of shapes"),
-            "families-hooks": board.by_group(entries, "family", "hooks", 2, "ends that are hooks, by family"),
-            "failures": board.failures(entries),
-            "runs": board.runs(entries),
-            "recorded": board.recorded(),
+def pieces(entries: Mapping[str, list[Entry]], rows: Mapping[str, list[dict]]) -> dict[str, str]:
+    """What stands at the places of the pages, by their names; of what is kept, and the leaderboards' entries."""
+    spent = {kind: seconds(board.KINDS[kind]) for kind in entries}
+    worse = {kind: board.worse(here) for kind, here in entries.items()}
+    found = {"failures": board.failures(entries), "runs": board.runs(entries), "losses": board.losses(worse)}
+    if entries.keys() == board.KINDS.keys():
+        found["short"] = board.short(rows["things"], rows["tubes"], spent["things"])
+        found["leaderboard"] = board.both(rows["things"], rows["tubes"], spent["things"])
+    for kind, here in entries.items():
+        words = "topology / perfect / error"
+        found |= {
+            f"{kind}-leaderboard": board.overview(rows[kind], spent[kind]),
+            f"{kind}-losses": board.all_losses(worse[kind]),
+            f"{kind}-variants": board.by_group(here, "variant", f"{words}, by kind of cloud"),
+            f"{kind}-families": board.by_group(here, "family", f"{words}, by family"),
         }
-    found |= {name: board.repeated(it) for name, objects in REPEATED.items() if (it := repeats(version, objects))}
-    prefix = "" if version == "v1" else "things-"
-    told = {f"{prefix}{name}": markdown([table]) for name, table in found.items()}
-    if entries:
-        where = {it["where"]: None for it in cpu.values()}
-        told[f"{prefix}leaderboard"] += "".join(f"\nCPU seconds: {it}\n" for it in where)
-    return {name: told[name] for name in PARTS[version] if name in told}
+    if again := repeats(board.KINDS["things"], "things"):
+        found["repeat"] = board.repeated(again)
+    told = {name: markdown([table]) for name, table in found.items()}
+    for kind, each in spent.items():
+        where = dict.fromkeys(it["where"] for it in each.values())
+        told[f"{kind}-leaderboard"] += "".join(f"\nCPU seconds: {it}\n" for it in where)
+    return {**told, "recorded": markdown([board.recorded()])}
 
 
 @app.command()
@@ -239,7 +238,7 @@ def picture(
     path: Annotated[Path, typer.Argument(metavar="PNG", callback=writable)],
     name: Annotated[str, typer.Option("--cloud", help="One of the benchmark.")] = "figures_100_scan2",
     tool: Tool = "default,pygel-points,cgal,pc-skeletor,cgal-poisson,skeletor-wavefront",
-    version: Version = "v1",
+    version: Version = "v3",
 ) -> None:
     """Draw the answers of some tools to one cloud, side by side."""
     entries = {entry.tool: entry for entry in kept(version)}
