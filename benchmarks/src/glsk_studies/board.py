@@ -97,6 +97,13 @@ def kept(version: str) -> list[Entry]:
     return [Entry(read_results(path), read(path)["made"]) for path in paths if path.is_file()]
 
 
+def keep_ten(version: str, found: Mapping[str, Any]) -> Path:
+    """Write some answers and their scores, packed; gives the path."""
+    path = kept_file(version, "ten.json.gz")
+    write_packed(path, dict(found))
+    return path
+
+
 def keep_seconds(version: str, found: Seconds) -> None:
     """Keep the median CPU seconds `cpu` of some tools, their memory `mb`, and `where` that was, with what is there."""
     path = kept_file(version, "seconds.json")

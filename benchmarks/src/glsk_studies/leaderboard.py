@@ -15,13 +15,13 @@ from statistics import median
 from typing import Annotated
 
 import typer
-from glsk_bench import BenchmarkFolder, make, read_folder, repeat, sample, score_answers
+from glsk_bench import BenchmarkFolder, make, read_folder, repeat, sample, score, score_answers
 from glsk_bench.clouds import cloud
 from glsk_bench.scoring import TIMES_NAME, read_times
 from glsk_bench.shapes import shape
 from glsk_bench.versions import VERSIONS
 
-from glsk_o3d import read_cloud, save_skeleton
+from glsk_o3d import read_cloud, read_skeleton, save_skeleton
 from glsk_o3d.interop.atomic import write_json
 from glsk_o3d.interop.clouds import cloud_points
 
@@ -40,6 +40,8 @@ PRELOADED = ("glsk_o3d.pipelines", "glsk_o3d.filters.refiner", "glsk_o3d.io.scan
 PRELOADED += ("glsk_bench.scoring", "glsk_bench.making", "glsk_bench.table", "open3d", "typer", "trimesh", "skeletor")
 PRELOADED += ("pc_skeletor", "pygel3d.graph", "compas_cgal.skeletonization", "compas_cgal.meshing", "skan")
 PRELOADED += ("glsk_studies.leaderboard",)  # which each process loads anew otherwise
+TEN = ("animals_100", "blades_100", "mugs_100", "rings_100", "toys_100")  # shapes of which two clouds each are kept
+TEN_VARIANTS = ("depth2", "flying")
 IMAGES = ROOT / "docs" / "images"
 PARTS = (  # of pages; those of a kind of shapes begin with it
     *("short", "leaderboard", "losses", "failures", "runs", "recorded", "repeat"),
@@ -78,6 +80,19 @@ def keep_(place: Place, tool: Tool = "") -> None:
             lacking = {it.shape for it in bench.scored if it.name not in read_times(place / name)}
             shapes = {shape: told for shape, told in bench.shapes.items() if shape not in lacking}
             keep_scores(replace(bench, shapes=shapes), place / name, read(place / name / TIMES_NAME)["made"])
+
+
+@app.command("ten")
+def ten_(place: Place, tool: Tool = "cao2010", version: Version = "v3") -> None:
+    """Keep a tool's answers to ten clouds, and all digits of their scores, with which scripts/try_wheel.py compares."""
+    bench, found = read_folder(place / BENCH), {}
+    for each in bench.scored:
+        if each.shape in TEN and each.variant in TEN_VARIANTS:
+            answer = read_skeleton(place / tool / f"{each.name}.npz")
+            vertices, edges = answer.vertices.round(6).tolist(), answer.edges.tolist()
+            scores = score(bench.truth(each.shape), vertices, edges).as_dict()
+            found[each.name] = dict(vertices=vertices, edges=edges, scores=scores)
+    typer.echo(board.keep_ten(version, found))
 
 
 def keep_scores(bench: BenchmarkFolder, answers: Path, made: dict) -> None:
