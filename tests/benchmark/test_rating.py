@@ -104,6 +104,7 @@ def test_a_cloud_without_an_answer_is_drawn_alone(small, tmp_path):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "tubes_100_clean.obj").write_text("v 0 0 0\nv 1 0 0\nl 1 2\n")
     assert len(draw_sheet(small, tmp_path / "mine", tmp_path / "a.png", n=99)) == len(small.scored)
-    with pytest.raises(InvalidParameterError, match="n = 0"):
-        draw_sheet(small, tmp_path / "mine", tmp_path / "b.png", n=0)
+    for n in (0, 101):
+        with pytest.raises(InvalidParameterError, match=f"n = {n}"):
+            draw_sheet(small, tmp_path / "mine", tmp_path / "b.png", n=n)
     assert not (tmp_path / "b.png").exists()

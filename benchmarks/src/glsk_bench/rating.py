@@ -24,6 +24,7 @@ ANSWERS = ("accept", "edit", "reject")
 """What a rater says of a skeleton: to be used as it is, after one edit, or not."""
 VIEWS = ((15.0, -65.0), (15.0, 25.0))  # elevation and azimuth of the two pictures of a skeleton, in degrees
 ACROSS, SIDE = 4, 2.2  # skeletons in a row of a sheet, and the inches of a picture
+MOST = 100  # fitted: skeletons, so that pictures can still be opened
 HEAD = ("number", "cloud", "answer")  # of a rater's table
 
 
@@ -47,7 +48,7 @@ def draw_sheet(
     path : path-like
         Of a PNG.
     n : int
-        Skeletons, at most all scored clouds.
+        Skeletons, at most 100, and all scored clouds.
     seed : int
         0 or more; the same seed takes the same clouds, whichever program answered.
 
@@ -81,7 +82,7 @@ def draw_sheet(
     ['tubes_100_clean']
     'number,cloud,answer\\n1,tubes_100_clean,\\n'
     """
-    check_number("n", n, "int", low=1)
+    check_number("n", n, "int", low=1, high=MOST)
     check_number("seed", seed, "int", low=0)
     given = Answers(folder, answers)
     clouds = given.made.scored
@@ -95,7 +96,8 @@ def draw_sheet(
         for side, view in enumerate(VIEWS):
             axes = figure.add_subplot(down, 2 * across, 2 * number - 1 + side, projection="3d")
             plot_skeleton(None if isinstance(found, str) else found, axes, cloud=points, view=view)
-        axes.set_title(f"{number}" if not isinstance(found, str) else f"{number}: no answer", loc="left", fontsize=9)
+            if side == 0:
+                axes.set_title(f"{number}: no answer" if isinstance(found, str) else f"{number}", fontsize=9)
     lines = [HEAD, *((str(number), cloud.name, "") for number, cloud in enumerate(taken, 1))]
     text = "".join(",".join(line) + "\n" for line in lines)
     save_figure(figure, path)

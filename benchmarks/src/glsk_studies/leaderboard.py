@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from statistics import median
 from typing import Annotated
@@ -60,7 +61,7 @@ Limit = Annotated[float, typer.Option("--limit", help="Seconds for a skeleton.")
 def run_(
     place: Place,
     tool: Tool = "",
-    limit: Limit = 60.0,
+    limit: Limit = 300.0,
     jobs: Jobs = 2,
     version: Version = "v3",
 ) -> None:
@@ -107,7 +108,7 @@ def repeat_(
     meshes: Annotated[Path | None, typer.Argument(metavar="MESHES", help="A folder; else things.")] = None,
     tool: Tool = "",
     draws: Annotated[int, typer.Option("--draws", min=2, help="Clouds of each object.")] = 5,
-    limit: Limit = 60.0,
+    limit: Limit = 300.0,
     jobs: Jobs = 2,
     version: Version = "v3",
 ) -> None:
@@ -127,10 +128,13 @@ def answered(
 ) -> Iterator[tuple[str, dict]]:
     """Run tools over all clouds, or go on; gives the name of each, when all are done, and what it was made with."""
     one_thread()
-    for name, peer in peers.items():
-        made, times = begun(place / name, peer, limit)
-        todo = [it for it in bench.scored if it.name not in times]
-        todo.sort(key=lambda it: bench.shapes[it.shape].get("seed", 0))  # so that a part has shapes of all families
+    known = {name: begun(place / name, peer, limit) for name, peer in peers.items()}
+    seeds: dict[int, list] = {}  # first those of all tools and families, so that what is stopped can be compared
+    for it in bench.scored:
+        seeds.setdefault(bench.shapes[it.shape].get("seed", 0), []).append(it)
+    for (_, clouds), (name, peer) in product(sorted(seeds.items()), peers.items()):
+        made, times = known[name]
+        todo = [it for it in clouds if it.name not in times]
         for first in range(0, len(todo), KEPT_AFTER):
             some = todo[first : first + KEPT_AFTER]
             work = [(dict(cloud=it.name), (it.path, peer, place / name / f"{it.name}.npz")) for it in some]
@@ -138,7 +142,7 @@ def answered(
                 spent = limit if "not done" in row.get("failure", "") else None
                 times[row["cloud"]] = {"seconds": row.get("seconds", spent), "failure": row.get("failure")}
             write_json(place / name / TIMES_NAME, {"made": made, "clouds": times})
-        yield name, made
+    yield from ((name, made) for name, (made, _) in known.items())
 
 
 def begun(folder: Path, peer: Peer, limit: float) -> tuple[dict, dict]:
