@@ -11,6 +11,7 @@ command may succeed, or end with a message that names an extra; anything else is
 import gzip
 import json
 import math
+import os
 import re
 import subprocess
 import sys
@@ -82,7 +83,7 @@ def try_extra(wheel: Path, bench: Path, extra: str, folder: Path) -> tuple[float
         (here / name).write_bytes(b"none")
     asked, wrong = [], []
     for line in COMMANDS.splitlines():
-        done = subprocess.run([binaries / "glsk", *line.split()], cwd=here, capture_output=True, text=True)
+        done = run(binaries / "glsk", here, *line.split())
         said = done.stderr.strip().splitlines()[-1:] or [""]
         if wants := re.search(r'pip install (?:"glsk-o3d\[|\./)(\w+)', done.stderr):
             asked.append(wants[1])
@@ -103,8 +104,8 @@ def try_ten(glsk: Path, here: Path) -> list[str]:
         lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in it["vertices"]] + [f"l {a + 1} {b + 1}" for a, b in it["edges"]]
         (here / "answers" / f"{name}.obj").write_text("\n".join(lines))
     choice = ("--version", "v3", "--families", families, "--seeds", seeds, "--variants", variants)
-    made = run(glsk, here, "benchmark", "make", "ten", *choice, "--json")
-    run(glsk, here, "benchmark", "score", "ten", "answers", "-o", "ten.json", "-q")
+    made = json.loads(run(glsk, here, "benchmark", "make", "ten", *choice, "--json", check=True).stdout)
+    run(glsk, here, "benchmark", "score", "ten", "answers", "-o", "ten.json", "-q", check=True)
     rows = {f"{row['shape']}_{row['variant']}": row for row in json.loads((here / "ten.json").read_text())["clouds"]}
     wrong = [] if made["sameness"]["bits"] == len(kept) else [f"clouds that are not the same: {made['sameness']}"]
     for name, it in kept.items():
@@ -113,10 +114,10 @@ def try_ten(glsk: Path, here: Path) -> list[str]:
     return wrong
 
 
-def run(glsk: Path, here: Path, *words: str) -> dict:
-    """What a command prints as JSON, if that is asked for."""
-    done = subprocess.run([glsk, *words], cwd=here, capture_output=True, text=True, check=True)
-    return json.loads(done.stdout or "{}")
+def run(glsk: Path, here: Path, *words: str, check: bool = False) -> subprocess.CompletedProcess:
+    """Run a command in a folder, with nothing of a clone on its path."""
+    bare = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    return subprocess.run([glsk, *words], cwd=here, env=bare, capture_output=True, text=True, check=check)
 
 
 def size(folder: Path) -> int:

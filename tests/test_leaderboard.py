@@ -9,9 +9,11 @@ import sys
 import time
 
 import pytest
-from glsk_bench import Results, read_folder, read_results
+from glsk_bench import Results, make, read_folder, read_results, score
 from glsk_bench.scoring import Scores
 from glsk_studies import board, leaderboard, runs
+
+from glsk_o3d import read_skeleton, save_skeleton
 
 STUDY = leaderboard
 
@@ -103,6 +105,20 @@ class TestKept:
             if name != "recorded":  # late solves of wen2024 round otherwise elsewhere
                 assert there == text.strip()
 
+    def test_ten_clouds_are_made_and_scored_as_kept(self, tmp_path):
+        kept = board.read_kept("v3", "ten.json.gz")
+        families, _, variants = ({*words} for words in zip(*(name.split("_") for name in kept), strict=True))
+        made = make(tmp_path / "ten", "v3", families=families, seeds=[100], variants=variants, jobs=1)
+        assert {it.name for it in made.scored} == {*kept}
+        assert "other" not in [it["sameness"] for told in made.shapes.values() for it in told["clouds"].values()]
+        for it in made.scored:
+            told = kept[it.name]
+            found = score(made.truth(it.shape), told["vertices"], told["edges"]).as_dict()
+            known = {name: value for name, value in told["scores"].items() if value is not None}
+            assert {name for name, value in found.items() if value is not None} == known.keys()
+            found = {name: found[name] for name in known}
+            assert found == pytest.approx(known, rel=1e-9)  # to the bit where the processor is the same
+
 
 class TestCommands:
     def test_run_keeps_the_scores_and_goes_on(self, call, small, tmp_path, monkeypatch):
@@ -128,6 +144,19 @@ class TestCommands:
             "v1",
         )
         assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
+
+    def test_ten_answers_are_kept_with_their_scores(self, call, small, perfect, tmp_path, monkeypatch):
+        monkeypatch.setattr(board, "KEPT", tmp_path)
+        (tmp_path / "v1").mkdir()
+        monkeypatch.setattr(leaderboard, "TEN", ("trees_101", "tubes_101"))
+        monkeypatch.setattr(leaderboard, "TEN_VARIANTS", ("scan2",))
+        (tmp_path / "mine").mkdir()
+        answer = read_skeleton(perfect / "tubes_101_scan2.obj")
+        save_skeleton(answer, tmp_path / "mine" / "tubes_101_scan2.npz")
+        assert "ten.json.gz" in call("ten", tmp_path, "--tool", "mine", "--version", "v1")
+        (told,) = board.read_kept("v1", "ten.json.gz").values()  # the other one is not scored
+        assert told["vertices"] == answer.vertices.round(6).tolist()
+        assert told["scores"]["perfect"] is True
 
     def test_what_is_done_so_far_is_kept_by_whole_shapes(self, call, small, tmp_path, monkeypatch):
         monkeypatch.setattr(board, "KEPT", tmp_path)
