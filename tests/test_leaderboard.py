@@ -44,7 +44,7 @@ class TestTables:
         _, low, high = found[1].difference
         assert found[1][:4] == ("all", "pygel", "error", 12)
         assert low < -0.017 < 0 < high
-        assert board.all_losses(found)[2] == [
+        assert board.all_losses(found, "tubes")[2] == [
             ["CGAL of wrap", "error", "all -0.100, clean -0.100, tubes -0.100", ""],
             ["PyGEL3D of coarser wrap", "error", "", "all -0.017, clean -0.017, tubes -0.017"],
         ]
@@ -66,8 +66,8 @@ class TestTables:
         assert first.shapes == 3
         assert first.means == pytest.approx([0.1, 0.2])
         ranks = board.ranked(here)
-        assert [line[-3] for line in board.overview(ranks, {})[2]] == ["6", "3"]
-        _, _, (whole, some) = board.by_group(here, "variant", "all")
+        assert [line[-3] for line in board.overview(ranks, {}, "tubes")[2]] == ["6", "3"]
+        _, _, (whole, some) = board.by_group(here, "variant", "tubes")
         assert whole == ["`default`", "points", "1.00 / 1.00 / 0.55"]
         assert some == ["CGAL, 3 clouds", "wrap", "0.50 / 1.00 / 0.10"]
 
@@ -89,7 +89,7 @@ class TestTables:
     def test_failures_are_counted_by_reason_and_variant(self):
         rows = [row(variant=it, failure=f"no answer: not done after {n} s") for it, n in (("a", 3), ("b", 9), ("b", 5))]
         *_, lines = board.failures(dict(things=entries(cgal=[*rows, row()]), tubes=entries(cgal=[row()])))
-        assert lines == [["things: CGAL", "wrap", "not done after 3 to 9 s", "b 2, a 1"]]
+        assert lines == [["things: CGAL", "coarser wrap", "not done after 3 to 9 s", "b 2, a 1"]]
 
 
 class TestKept:

@@ -22,7 +22,7 @@ from glsk_o3d.interop.atomic import write_json
 from glsk_o3d.interop.clouds import cloud_points
 from glsk_o3d.recipes.catalogue import named_pipeline
 
-from .peers import PEERS, skeleton_of
+from .peers import PEERS, peers_of, skeleton_of
 from .tables import BLUE, ORANGE, ROOT, Table, grouped, keep, number, read, save_figure, sheet, write_packed
 
 KEPT = ROOT / "benchmarks"  # a folder of it for each version of the benchmark
@@ -156,7 +156,7 @@ def ranked(entries: Sequence[Entry]) -> list[dict[str, Any]]:
     return sorted(rows, key=lambda row: [-row["all"][measure][0] for measure in ("perfect", "topology")])
 
 
-def overview(board: Sequence[dict[str, Any]], cpu: Seconds) -> Table:
+def overview(board: Sequence[dict[str, Any]], cpu: Seconds, kind: str) -> Table:
     """All tools over all clouds, the best first: what `ranked` gives."""
     lines, more = [], [name for name in OF_THINGS if name in MEASURES and any(entry["all"][name] for entry in board)]
     for entry in board:
@@ -167,7 +167,7 @@ def overview(board: Sequence[dict[str, Any]], cpu: Seconds) -> Table:
         rest = [number(mean[measure] and mean[measure][0], 3) for measure in ("inside", "completeness")]
         rest += [told(*mean[it], MEASURES[it][1]) if mean[it] else "-" for it in more]
         counts = [str(mean["clouds"]), str(mean["failures"])]
-        lines.append([*_label(name), *shares, *plain, error, *rest, *counts, _fact(cpu, name, "cpu", 2)])
+        lines.append([*_label(name, kind), *shares, *plain, error, *rest, *counts, _fact(cpu, name, "cpu", 2)])
     heads = ["tips F1", "junctions F1", "error", "inside", "complete"]
     heads += [*(MEASURES[it][0] for it in more), "clouds", "failures", "CPU s"]
     return _size(board), ["", "takes", "perfect", "topology", *heads], lines
@@ -188,7 +188,10 @@ def both(things: Sequence[dict[str, Any]], tubes: Sequence[dict[str, Any]], cpu:
         ]
         failed = str(here["failures"] + (there["failures"] if there else 0))
         spent = [_fact(cpu, name, "cpu", 2), _fact(cpu, name, "mb", 0)]
-        lines.append([*_label(name), str(here["clouds"]), *cells, failed, *spent])
+        label, takes = _label(name, "things")
+        if there and takes != (on_tubes := _label(name, "tubes")[1]):
+            takes = f"{takes}; tubes: {on_tubes}"
+        lines.append([label, takes, str(here["clouds"]), *cells, failed, *spent])
     heads = ["things", "perfect", "topology", "tips F1", "error", "tubes: perfect", "topology", "error"]
     title = f"things: {_size(things)}; tubes: {_size(tubes)}"
     return title, ["", "takes", *heads, "failures", "CPU s", "MB"], lines
@@ -272,17 +275,17 @@ def losses(found: Mapping[str, Sequence[Worse]]) -> Table:
             means = [number(mean, digits) for mean in best.means]
             difference = told(*best.difference, digits, sign="+")
             more = str(len(those) - 1) if len(those) > 1 else ""
-            lines.append([f"{kind}, {clouds}", words, _from(best.tool), *means, difference, more])
+            lines.append([f"{kind}, {clouds}", words, _from(best.tool, kind), *means, difference, more])
     header = ["clouds", "measure", "to", "theirs", "`default`", "difference", "others"]
     return "where `default` is worse", header, lines
 
 
-def all_losses(found: Sequence[Worse]) -> Table:
+def all_losses(found: Sequence[Worse], kind: str) -> Table:
     """All of these by tool, and where the mean alone is worse, so that other shapes could turn it."""
     groups: dict[tuple[str, str], tuple[list[str], list[str]]] = {}
     for it in found:
         words, digits, _ = MEASURES[it.measure]
-        groups.setdefault((_from(it.tool), words), ([], []))[not it.clear].append(
+        groups.setdefault((_from(it.tool, kind), words), ([], []))[not it.clear].append(
             f"{it.clouds} {it.difference[0]:+.{digits}f}"
         )
     lines = [[*key, *map(", ".join, places)] for key, places in groups.items()]
@@ -295,7 +298,7 @@ def interval(rows: Sequence[dict[str, Any]], measure: str, digits: int = 2, of: 
     return told(*mean_with_interval([row[of] for row in known], [row[measure] for row in known]), digits)
 
 
-def by_group(entries: Sequence[Entry], group: str, title: str) -> Table:
+def by_group(entries: Sequence[Entry], group: str, kind: str) -> Table:
     """Right topologies, perfect ones and the error of each tool, by variant or by family."""
     most = max(entries, key=lambda entry: len(entry.results.rows)).results.rows
     lines, measures = [], ("topology", "perfect", "error")
@@ -305,9 +308,10 @@ def by_group(entries: Sequence[Entry], group: str, title: str) -> Table:
             known = [[row[it] for row in groups.get(name, ()) if row[it] is not None] for it in measures]
             cells.append(" / ".join(number(fmean(it) if it else None, 2) for it in known))
         part = "" if len(entry.results.rows) == len(most) else f", {len(entry.results.rows)} clouds"
-        label, takes = _label(entry.tool)
+        label, takes = _label(entry.tool, kind)
         lines.append([f"{label}{part}", takes, *cells])
     sizes = Counter(row[group] for row in most)
+    title = f"topology / perfect / error, by {'kind of cloud' if group == 'variant' else group}"
     return title, ["", "takes", *(f"{name} ({size})" for name, size in sizes.items())], lines
 
 
@@ -320,7 +324,7 @@ def repeated(found: Sequence[Repeat]) -> Table:
         moved = [cells["moved"], number(means["median"], 2), *where]
         rest = [*(cells[name] for name in ("agree", "loops", "ends")), number(means["hooks"], 2)]
         double = [number((means["float32"] or {}).get(name), 2) for name in ("moved", "agree")]
-        lines.append([*_label(it.name), *moved, *rest, *double, str(means["failures"])])
+        lines.append([*_label(it.name, "things"), *moved, *rest, *double, str(means["failures"])])
     means = found[0].means()
     heads = ["moved", "median", "near ends", "near junctions", "elsewhere", "limbs", "agree", "loops", "ends", "hooks"]
     heads += ["float32: moved", "agree"]
@@ -345,7 +349,8 @@ def failures(entries: Mapping[str, Sequence[Entry]]) -> Table:
             for group in groups.values():
                 reasons, variants = zip(*group, strict=True)
                 which = ", ".join(f"{name} {n}" for name, n in Counter(variants).most_common())
-                lines.append([f"{kind}: {_label(entry.tool)[0]}", _label(entry.tool)[1], _span(reasons), which])
+                label, takes = _label(entry.tool, kind)
+                lines.append([f"{kind}: {label}", takes, _span(reasons), which])
     return "failures", ["", "takes", "why", "which"], lines
 
 
@@ -363,7 +368,7 @@ def runs(entries: Mapping[str, Sequence[Entry]]) -> Table:
                 [these[kind]["commit"] or "-", number(these[kind]["hours"], 2)] if kind in these else ["-"] * 2
             )
         ]
-        lines.append([*_label(tool), words, *cells])
+        lines.append([*_label(tool, next(iter(these))), words, *cells])
     heads = [head for kind in entries for head in (f"{kind}: commit", "hours")]
     total = f"runs, {number(sum(entry.made['hours'] for entry in everything), 1)} hours of all"
     return total, ["", "takes", "packages", *heads], lines
@@ -374,15 +379,17 @@ def _fact(cpu: Seconds, name: str, fact: str, digits: int) -> str:
 
 
 def _tool(name: str) -> str:
-    return _label(name)[0].partition(",")[0]
+    return _label(name, "things")[0].partition(",")[0]
 
 
-def _from(name: str) -> str:
-    return " of ".join(_label(name))
+def _from(name: str, kind: str) -> str:
+    return " of ".join(_label(name, kind))
 
 
-def _label(name: str) -> tuple[str, str]:
-    return PEERS[name].label, PEERS[name].takes
+def _label(name: str, kind: str) -> tuple[str, str]:
+    """What tables call a tool, and what it takes of shapes of a kind."""
+    peer = peers_of(KINDS[kind])[name]
+    return peer.label, peer.takes
 
 
 def _span(reasons: Sequence[str]) -> str:

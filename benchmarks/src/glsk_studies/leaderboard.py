@@ -28,7 +28,7 @@ from glsk_o3d.interop.clouds import cloud_points
 
 from . import board
 from .board import Entry, kept, repeats, seconds
-from .peers import PEERS, Peer, installed, one_thread, silence, skeleton_of
+from .peers import PEERS, Peer, installed, one_thread, peers_of, silence, skeleton_of
 from .runs import Jobs, application, writable
 from .runs import run as in_processes
 from .tables import ROOT, fill, machine, markdown, number, read, surroundings
@@ -66,7 +66,7 @@ def run_(
     version: Version = "v3",
 ) -> None:
     """Run tools over the whole benchmark, or go on where it was left, and keep their scores in benchmarks/VERSION."""
-    peers = installed(PEERS, tool)
+    peers = installed(peers_of(version), tool)
     bench = make(place / BENCH, version, jobs=jobs)
     for name, made in answered(bench, place, peers, limit, jobs):
         keep_scores(bench, place / name, made)
@@ -114,7 +114,7 @@ def repeat_(
 ) -> None:
     """Run tools over several clouds of each object, and keep how far their answers are apart in benchmarks/VERSION."""
     objects = "things" if meshes is None else "meshes"
-    folder, peers = place / f"repeat_{objects}", installed(PEERS, tool)
+    folder, peers = place / f"repeat_{objects}", installed(peers_of(version), tool)
     bench = sample(folder / BENCH, meshes, version=version, draws=draws, double=True)
     for name, made in answered(bench, folder, peers, limit, jobs):
         found = repeat(bench, folder / name, name=name)
@@ -172,7 +172,7 @@ def answer(cloud: Path, peer: Peer, path: Path) -> dict:
 @app.command("seconds")
 def seconds_(tool: Tool = "", version: Version = "v3") -> None:
     """CPU seconds and memory of each tool on the first shapes, kept in benchmarks/VERSION. For an idle Linux."""
-    peers = installed(PEERS, tool)
+    peers = installed(peers_of(version), tool)
     where = machine()
     one_thread()
     for name, peer in peers.items():
@@ -235,12 +235,11 @@ def pieces(entries: Mapping[str, list[Entry]], rows: Mapping[str, list[dict]]) -
         found["short"] = board.short(rows["things"], rows["tubes"], spent["things"])
         found["leaderboard"] = board.both(rows["things"], rows["tubes"], spent["things"])
     for kind, here in entries.items():
-        words = "topology / perfect / error"
         found |= {
-            f"{kind}-leaderboard": board.overview(rows[kind], spent[kind]),
-            f"{kind}-losses": board.all_losses(worse[kind]),
-            f"{kind}-variants": board.by_group(here, "variant", f"{words}, by kind of cloud"),
-            f"{kind}-families": board.by_group(here, "family", f"{words}, by family"),
+            f"{kind}-leaderboard": board.overview(rows[kind], spent[kind], kind),
+            f"{kind}-losses": board.all_losses(worse[kind], kind),
+            f"{kind}-variants": board.by_group(here, "variant", kind),
+            f"{kind}-families": board.by_group(here, "family", kind),
         }
     if again := repeats(board.KINDS["things"], "things"):
         found["repeat"] = board.repeated(again)
