@@ -65,10 +65,13 @@ class TestTables:
         (first, *_) = board.worse(here)
         assert first.shapes == 3
         assert first.means == pytest.approx([0.1, 0.2])
+        ours[0]["perfect"] = 0.0
         ranks = board.ranked(here)
+        assert [it["ours"] for it in ranks] == pytest.approx([2 / 3, 5 / 6])  # CGAL is perfect in all of its own
+        ranks.reverse()
         assert [line[-3] for line in board.overview(ranks, {}, "tubes")[2]] == ["6", "3"]
         _, _, (whole, some) = board.by_group(here, "variant", "tubes")
-        assert whole == ["`default`", "points", "1.00 / 1.00 / 0.55"]
+        assert whole == ["`default`", "points", "1.00 / 0.83 / 0.55"]
         assert some == ["CGAL, 3 clouds", "wrap", "0.50 / 1.00 / 0.10"]
 
     def test_things_and_tubes_stand_beside_each_other(self):
@@ -78,13 +81,27 @@ class TestTables:
         spent = dict(cgal=dict(cpu=1.5, mb=80.4))
         *_, lines = board.both(*ranks, spent)
         one = "1.00 [1.00, 1.00]"
-        assert lines[0] == ["`default`", "points", "1", one, one, "1.00", "0.20", *["1.00"] * 2, "0.10", "0", "-", "-"]
-        assert lines[1][5:] == ["1.00", "0.30", "0.00", "0.00", "-", "1", "1.50", "80"]
-        assert lines[2][7:10] == ["-", "-", "-"]
+        assert lines[0] == [
+            "`default`",
+            "points",
+            "1",
+            one,
+            "1.00",
+            one,
+            "1.00",
+            "0.20",
+            *["1.00"] * 2,
+            "0.10",
+            "0",
+            "-",
+            "-",
+        ]
+        assert lines[1][6:] == ["1.00", "0.30", "0.00", "0.00", "-", "1", "1.50", "80"]
+        assert lines[2][8:11] == ["-", "-", "-"]
         *_, lines = board.short(*ranks, spent)
-        assert lines[0] == ["`default`", "1.00", "1.00", "0.20", "1.00", "1.00", "0.10", "-"]
-        assert lines[1] == ["CGAL", "1.00", "0.00", "0.30", "0.00", "0.00", "-", "1.50"]
-        assert lines[2] == ["scikit-image", "1.00", "0.00", "0.10", "-", "-", "-", "-"]
+        assert lines[0] == ["`default`", "1", "1.00", "1.00", "0.20", "1", "1.00", "1.00", "0.10", "-"]
+        assert lines[1] == ["CGAL", "1", "1.00", "0.00", "0.30", "1", "0.00", "0.00", "-", "1.50"]
+        assert lines[2] == ["scikit-image", "1", "1.00", "0.00", "0.10", "-", "-", "-", "-", "-"]
 
     def test_failures_are_counted_by_reason_and_variant(self):
         rows = [row(variant=it, failure=f"no answer: not done after {n} s") for it, n in (("a", 3), ("b", 9), ("b", 5))]

@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import product
+from operator import itemgetter
 from pathlib import Path
 from statistics import fmean
 from typing import Any, NamedTuple
@@ -51,6 +52,8 @@ MEASURES = {  # what may be lost, its digits, and whether more of it is better; 
 NUMBER = re.compile(r"(?<!code )(?<!signal )\d+(?:\.\d+)?")  # of a reason; those of codes and signals are names
 VIEW = (14, -60)  # elevation and azimuth, in degrees
 SPREAD = ("moved", "agree", "loops", "ends")  # of several clouds of an object, with intervals
+
+PERFECT = itemgetter("shape", "variant", "perfect")
 
 Seconds = dict[str, dict[str, Any]]
 
@@ -151,8 +154,15 @@ def recorded() -> Table:
 
 
 def ranked(entries: Sequence[Entry]) -> list[dict[str, Any]]:
-    """The entries of a `Leaderboard`, of which some may have a part of the clouds; the best first."""
-    rows = [leaderboard([entry.results]).entries[0] for entry in entries]
+    """The entries of a `Leaderboard`, of which some may have a part of the clouds; the best first.
+
+    Each also has `ours`, the share of its clouds in which `default` is perfect.
+    """
+    ours = {it[:2]: it[2] for entry in entries if entry.tool == OURS for it in map(PERFECT, entry.results.rows)}
+    rows = []
+    for entry in entries:
+        known = [ours[it[:2]] for it in map(PERFECT, entry.results.rows) if it[:2] in ours]
+        rows.append(leaderboard([entry.results]).entries[0] | {"ours": fmean(known) if known else None})
     return sorted(rows, key=lambda row: [-row["all"][measure][0] for measure in ("perfect", "topology")])
 
 
@@ -179,7 +189,9 @@ def both(things: Sequence[dict[str, Any]], tubes: Sequence[dict[str, Any]], cpu:
     for entry in things:
         name, here, there = entry["name"], entry["all"], other.get(entry["name"])
         cells = [
-            *(told(*here[measure]) for measure in ("perfect", "topology")),
+            told(*here["perfect"]),
+            number(entry["ours"], 2),
+            told(*here["topology"]),
             *(number(here[measure] and here[measure][0], 2) for measure in ("tips_f1", "error")),
             *(
                 number(there and there[measure] and there[measure][0], 2)
@@ -192,7 +204,17 @@ def both(things: Sequence[dict[str, Any]], tubes: Sequence[dict[str, Any]], cpu:
         if there and takes != (on_tubes := _label(name, "tubes")[1]):
             takes = f"{takes}; tubes: {on_tubes}"
         lines.append([label, takes, str(here["clouds"]), *cells, failed, *spent])
-    heads = ["things", "perfect", "topology", "tips F1", "error", "tubes: perfect", "topology", "error"]
+    heads = [
+        "things",
+        "perfect",
+        "`default` there",
+        "topology",
+        "tips F1",
+        "error",
+        "tubes: perfect",
+        "topology",
+        "error",
+    ]
     title = f"things: {_size(things)}; tubes: {_size(tubes)}"
     return title, ["", "takes", *heads, "failures", "CPU s", "MB"], lines
 
@@ -206,12 +228,12 @@ def short(things: Sequence[dict[str, Any]], tubes: Sequence[dict[str, Any]], cpu
         for entry in board:
             mean = entry["all"]
             shares = [number(mean[it] and mean[it][0], 2) for it in ("topology", "perfect", "error")]
-            best.setdefault(_tool(entry["name"]), shares)
+            best.setdefault(_tool(entry["name"]), [str(mean["clouds"]), *shares])
             spent.setdefault(_tool(entry["name"]), _fact(cpu, entry["name"], "cpu", 2))
         for tool in {**cells, **best}:
-            done = cells.setdefault(tool, ["-"] * 3 if board is tubes else [])
-            done += best.get(tool, ["-"] * 3)
-    heads = [f"{kind}: {it}" for kind in ("things", "tubes") for it in ("topology", "perfect", "error")]
+            done = cells.setdefault(tool, ["-"] * 4 if board is tubes else [])
+            done += best.get(tool, ["-"] * 4)
+    heads = [head for kind in ("things", "tubes") for head in (kind, "topology", "perfect", "error")]
     lines = [[tool, *row, spent[tool]] for tool, row in cells.items()]
     return f"things: {_size(things)}; tubes: {_size(tubes)}", ["", *heads, "CPU s"], lines
 
