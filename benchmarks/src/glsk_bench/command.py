@@ -46,7 +46,7 @@ def make(
         list[str] | None, typer.Option(metavar="NAMES", help="Of clouds, with commas; by default all of the version.")
     ] = None,
     version: Annotated[
-        str, typer.Option(metavar="NAME", help="Of the benchmark: v1, round shapes, or v2, things.")
+        str, typer.Option(metavar="NAME", help="Of the benchmark: v1, round shapes; v2 or v3, things.")
     ] = "v1",
     jobs: Jobs = None,
     as_json: Json = False,

@@ -33,6 +33,7 @@ GOLDEN = ROOT / "tests" / "golden"
 KNOWN = {"y_unequal": (1, 0, 3), "torus": (1, 1, 0), "quadruped": (1, 0, 6)}  # components, loops, leaves
 
 OURS = "default"
+FIRST = ("perfect", "topology", "tips_f1", "junctions_f1", "error")
 LEAST_SHAPES = 3  # of which a difference is told
 MEASURES = {  # what may be lost, its digits, and whether more of it is better; of what has a sign, its size counts
     "perfect": ("perfect", 2, True),
@@ -263,14 +264,22 @@ class Worse(NamedTuple):
 
 
 def worse(entries: Sequence[Entry]) -> list[Worse]:
-    """All of these, by clouds, tool and measure; fewer than three shapes have no interval to speak of."""
+    """All of these, by clouds, tool and measure; fewer than three shapes have no interval to speak of.
+
+    Of one family as one kind of cloud there are those of the first measures, with an interval without 0.
+    """
     by_name = {entry.tool: {(row["shape"], row["variant"]): row for row in entry.results.rows} for entry in entries}
     ours, found = by_name.pop(OURS, {}), []
     groups: dict[str, list] = {"all": [*ours]}
     for part in ("variant", "family"):
         for key, row in ours.items():
             groups.setdefault(row[part], []).append(key)
+    parts = {*groups}
+    for key, row in ours.items():
+        groups.setdefault(f"{row['family']} {row['variant']}", []).append(key)
     for (group, here), (name, theirs), measure in product(groups.items(), by_name.items(), MEASURES):
+        if group not in parts and measure not in FIRST:
+            continue
         pairs = [(key[0], (theirs[key][measure], ours[key][measure])) for key in here if key in theirs]
         known = [(shape, (abs(a), abs(b))) for shape, (a, b) in pairs if a is not None and b is not None]
         if len({shape for shape, _ in known}) >= LEAST_SHAPES:
@@ -279,7 +288,8 @@ def worse(entries: Sequence[Entry]) -> list[Worse]:
             _, digits, more = MEASURES[measure]
             if round(difference[0] if more else -difference[0], digits) > 0:
                 means = [sum(side) / len(both) for side in zip(*both, strict=True)]
-                found.append(Worse(group, name, measure, len({*shapes}), means, difference))
+                it = Worse(group, name, measure, len({*shapes}), means, difference)
+                found += [it] if group in parts or it.clear else []
     return found
 
 
@@ -297,8 +307,9 @@ def losses(found: Mapping[str, Sequence[Worse]]) -> Table:
             means = [number(mean, digits) for mean in best.means]
             difference = told(*best.difference, digits, sign="+")
             more = str(len(those) - 1) if len(those) > 1 else ""
-            lines.append([f"{kind}, {clouds}", words, _from(best.tool, kind), *means, difference, more])
-    header = ["clouds", "measure", "to", "theirs", "`default`", "difference", "others"]
+            where = [f"{kind}, {clouds}", str(best.shapes), words, _from(best.tool, kind)]
+            lines.append([*where, *means, difference, more])
+    header = ["clouds", "shapes", "measure", "to", "theirs", "`default`", "difference", "others"]
     return "where `default` is worse", header, lines
 
 

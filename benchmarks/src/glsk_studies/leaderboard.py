@@ -8,13 +8,13 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from statistics import median
 from typing import Annotated
 
+import numpy as np
 import typer
 from glsk_bench import BenchmarkFolder, make, read_folder, repeat, sample, score, score_answers
 from glsk_bench.clouds import cloud
@@ -172,11 +172,12 @@ def answer(cloud: Path, peer: Peer, path: Path) -> dict:
 @app.command("seconds")
 def seconds_(tool: Tool = "", version: Version = "v3") -> None:
     """CPU seconds and memory of each tool on the first shapes, kept in benchmarks/VERSION. For an idle Linux."""
-    peers = installed(peers_of(version), tool)
-    where = machine()
+    peers, asked, where = installed(peers_of(version), tool), VERSIONS[version], machine()
+    shapes = [shape(family, asked.seeds[0], steady=asked.steady) for family in asked.families]
+    clouds = [cloud(it, variant) for it in shapes for variant in TIMED if variant in asked.variants_of(it.name)]
     one_thread()
     for name, peer in peers.items():
-        (row,) = in_processes(timed, [(dict(tool=name), (peer, version))], 1, fresh=True)
+        (row,) = in_processes(timed, [(dict(tool=name), (peer, clouds))], 1, fresh=True, preload=PRELOADED)
         if "failure" in row:
             typer.echo(f"{name}: {row['failure']}")
             continue
@@ -184,15 +185,10 @@ def seconds_(tool: Tool = "", version: Version = "v3") -> None:
         typer.echo(f"{name}: {row['cpu']:.2f} s, {row['mb']:.0f} MB")
 
 
-def timed(peer: Peer, version: str) -> dict:
-    """The median CPU seconds of a tool, after a first call, and the MB that its calls take at most."""
-    asked = VERSIONS[version]
-    shapes = [shape(family, asked.seeds[0], steady=asked.steady) for family in asked.families]
-    clouds = [cloud(it, variant) for it in shapes for variant in TIMED if variant in asked.variants_of(it.name)]
-    with silence(), suppress(Exception):
-        peer.warm_up()
-    Path("/proc/self/clear_refs").write_text("5")  # so that VmHWM begins anew
+def timed(peer: Peer, clouds: list[np.ndarray]) -> dict:
+    """The median CPU seconds of a tool after a first call, and how many MB all its calls take at most."""
     before = memory("VmRSS")
+    Path("/proc/self/clear_refs").write_text("5")  # so that VmHWM begins anew
     spent = [peer.timed(points)[1] for points in clouds]
     return dict(cpu=median(spent), mb=memory("VmHWM") - before)
 
