@@ -22,8 +22,9 @@ from .scoring import Answers
 
 ANSWERS = ("accept", "edit", "reject")
 """What a rater says of a skeleton: to be used as it is, after one edit, or not."""
-VIEWS = ((15.0, -65.0), (15.0, 25.0))  # elevation and azimuth of the two pictures of a skeleton, in degrees
-ACROSS, SIDE = 4, 2.2  # skeletons in a row of a sheet, and the inches of a picture
+VIEWS = ((15.0, -65.0), (15.0, 25.0))  # fitted: elevation and azimuth of a skeleton's two pictures [degrees], to see all
+ACROSS = 4  # fitted: skeletons in a row of a sheet, as a screen is wide
+SIDE = 2.2  # fitted: of a picture [inches], so that short limbs show
 MOST = 100  # fitted: skeletons, so that pictures can still be opened
 HEAD = ("number", "cloud", "answer")  # of a rater's table
 
