@@ -22,7 +22,7 @@ from .scoring import Answers
 
 ANSWERS = ("accept", "edit", "reject")
 """What a rater says of a skeleton: to be used as it is, after one edit, or not."""
-VIEWS = ((15.0, -65.0), (15.0, 25.0))  # fitted: elevation and azimuth of a skeleton's two pictures [degrees], to see all
+VIEWS = ((15.0, -65.0), (15.0, 25.0))  # fitted: elevation and azimuth of a skeleton's two pictures [degrees]
 ACROSS = 4  # fitted: skeletons in a row of a sheet, as a screen is wide
 SIDE = 2.2  # fitted: of a picture [inches], so that short limbs show
 MOST = 100  # fitted: skeletons, so that pictures can still be opened
