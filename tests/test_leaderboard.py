@@ -98,6 +98,8 @@ class TestTables:
         ]
         assert lines[1][6:] == ["1.00", "0.30", "0.00", "0.00", "-", "1", "1.50", "80"]
         assert lines[2][8:11] == ["-", "-", "-"]
+        *_, lines = board.both(ranks[0][:1], ranks[1], spent)
+        assert lines[1][:9] == ["CGAL", "coarser wrap; tubes: wrap", *["-"] * 6, "0.00"]
         *_, lines = board.short(*ranks, spent)
         assert lines[0] == ["`default`", "1", "1.00", "1.00", "0.20", "1", "1.00", "1.00", "0.10", "-"]
         assert lines[1] == ["CGAL", "1", "1.00", "0.00", "0.30", "1", "0.00", "0.00", "-", "1.50"]

@@ -186,36 +186,24 @@ def overview(board: Sequence[dict[str, Any]], cpu: Seconds, kind: str) -> Table:
 
 def both(things: Sequence[dict[str, Any]], tubes: Sequence[dict[str, Any]], cpu: Seconds) -> Table:
     """The same in few columns, of things and of tubes."""
-    other, lines = {entry["name"]: entry["all"] for entry in tubes}, []
-    for entry in things:
-        name, here, there = entry["name"], entry["all"], other.get(entry["name"])
-        cells = [
-            told(*here["perfect"]),
-            number(entry["ours"], 2),
-            told(*here["topology"]),
-            *(number(here[measure] and here[measure][0], 2) for measure in ("tips_f1", "error")),
-            *(
-                number(there and there[measure] and there[measure][0], 2)
-                for measure in ("perfect", "topology", "error")
-            ),
-        ]
-        failed = str(here["failures"] + (there["failures"] if there else 0))
-        spent = [_fact(cpu, name, "cpu", 2), _fact(cpu, name, "mb", 0)]
+    of_things, of_tubes = ({entry["name"]: entry for entry in board} for board in (things, tubes))
+    lines = []
+    for name in {**of_things, **of_tubes}:
+        cells = ["-"] * 6
+        if entry := of_things.get(name):
+            mean = entry["all"]
+            shares = [told(*mean["perfect"]), number(entry["ours"], 2), told(*mean["topology"])]
+            rest = [number(mean[measure] and mean[measure][0], 2) for measure in ("tips_f1", "error")]
+            cells = [str(mean["clouds"]), *shares, *rest]
+        here = [board[name]["all"] for board in (of_things, of_tubes) if name in board]
+        there = of_tubes[name]["all"] if name in of_tubes else {}
+        cells += [number((there.get(it) or [None])[0], 2) for it in ("perfect", "topology", "error")]
+        cells += [str(sum(mean["failures"] for mean in here)), _fact(cpu, name, "cpu", 2), _fact(cpu, name, "mb", 0)]
         label, takes = _label(name, "things")
-        if there and takes != (on_tubes := _label(name, "tubes")[1]):
-            takes = f"{takes}; tubes: {on_tubes}"
-        lines.append([label, takes, str(here["clouds"]), *cells, failed, *spent])
-    heads = [
-        "things",
-        "perfect",
-        "`default` there",
-        "topology",
-        "tips F1",
-        "error",
-        "tubes: perfect",
-        "topology",
-        "error",
-    ]
+        on_tubes = _label(name, "tubes")[1]
+        lines.append([label, takes if takes == on_tubes else f"{takes}; tubes: {on_tubes}", *cells])
+    heads = ["things", "perfect", "`default` there", "topology", "tips F1", "error"]
+    heads += ["tubes: perfect", "topology", "error"]
     title = f"things: {_size(things)}; tubes: {_size(tubes)}"
     return title, ["", "takes", *heads, "failures", "CPU s", "MB"], lines
 
@@ -360,7 +348,7 @@ def repeated(found: Sequence[Repeat]) -> Table:
         lines.append([*_label(it.name, "things"), *moved, *rest, *double, str(means["failures"])])
     means = found[0].means()
     heads = ["moved", "median", "near ends", "near junctions", "elsewhere", "limbs", "agree", "loops", "ends", "hooks"]
-    heads += ["float32: moved", "agree"]
+    heads += ["float32: moved", "float32: agree"]
     title = f"{means['draws']} clouds of {means['objects']} objects"
     return title, ["", "takes", *heads, "failures"], lines
 
