@@ -57,6 +57,15 @@ class TestTables:
         assert lines[0][3:5] == ["PyGEL3D of coarser wrap", "0.100"]
         assert {line[-1] for line in lines} == {"2"}
 
+    def test_a_family_as_several_kinds_of_clouds_has_one_line(self):
+        places = [(f"tubes_{seed}", variant) for seed in range(100, 104) for variant in ("clean", "holes")]
+        ours = [row(*place, error=0.3) for place in places]
+        here = {"clean": 0.2, "holes": 0.1}
+        found = board.worse(entries(default=ours, cgal=[row(*place, error=here[place[1]]) for place in places]))
+        *_, lines = board.losses({"tubes": found})
+        assert [line[0] for line in lines][-2:] == ["tubes, tubes", "tubes, tubes holes, 1 more"]
+        assert lines[-1][4:6] == ["0.100", "0.300"]
+
     def test_a_part_of_the_clouds_is_compared_on_these_and_told(self):
         shapes = [f"tubes_{seed}" for seed in range(100, 106)]
         ours = [row(it, error=0.2 if it < "tubes_103" else 0.9) for it in shapes]

@@ -282,20 +282,26 @@ def worse(entries: Sequence[Entry]) -> list[Worse]:
 
 
 def losses(found: Mapping[str, Sequence[Worse]]) -> Table:
-    """Where `default` is worse whatever shapes are drawn, intervals without 0: by kind, to the best other alone."""
+    """Where `default` is worse whatever shapes are drawn, intervals without 0: by kind, to the best other alone.
+
+    Of a family as several kinds of clouds that with the largest difference stands for all.
+    """
     lines = []
     for kind, here in found.items():
-        groups: dict[tuple[str, str], list[Worse]] = {}
+        groups: dict[tuple[str, str, bool], list[Worse]] = {}
         for it in here:
             if it.clear:
-                groups.setdefault((it.clouds, it.measure), []).append(it)
-        for (clouds, measure), those in groups.items():
+                where = it.clouds.partition(" ")[0]
+                groups.setdefault((where, it.measure, " " in it.clouds), []).append(it)
+        for (_, measure, _), those in groups.items():
             words, digits, _ = MEASURES[measure]
             best = max(those, key=lambda it: abs(it.difference[0]))
             means = [number(mean, digits) for mean in best.means]
             difference = told(*best.difference, digits, sign="+")
-            more = str(len(those) - 1) if len(those) > 1 else ""
-            where = [f"{kind}, {clouds}", str(best.shapes), words, _from(best.tool, kind)]
+            tools, clouds = ({getattr(it, fact) for it in those} for fact in ("tool", "clouds"))
+            more = str(len(tools) - 1) if len(tools) > 1 else ""
+            further = f", {len(clouds) - 1} more" if len(clouds) > 1 else ""
+            where = [f"{kind}, {best.clouds}{further}", str(best.shapes), words, _from(best.tool, kind)]
             lines.append([*where, *means, difference, more])
     header = ["clouds", "shapes", "measure", "to", "theirs", "`default`", "difference", "others"]
     return "where `default` is worse", header, lines
