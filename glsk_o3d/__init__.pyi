@@ -32,7 +32,6 @@ from .errors import (
 from .filters.connector import Connector
 from .filters.contractor import Contractor
 from .filters.denoiser import Denoiser
-from .filters.inscriber import Inscriber
 from .filters.lpr_reducer import LPRReducer
 from .filters.outlier_remover import OutlierRemover
 from .filters.refiner import Refiner
@@ -44,7 +43,7 @@ from .filters.tracer import Tracer
 from .interop.clouds import Cloud
 from .io.annotation import annotate
 from .io.formats.gltf import save_rig
-from .io.geometry import to_line_set, to_tubes
+from .io.geometry import to_line_set, to_tubes, to_voxels
 from .io.scans import read_cloud, read_tensor_cloud
 from .io.skeletons import read_skeleton, read_truth, save_skeleton
 from .io.streaming import annotate_file, read_sample
@@ -70,7 +69,6 @@ __all__ = [
     "FileFormatError",
     "Filter",
     "GlskError",
-    "Inscriber",
     "InvalidCloudError",
     "InvalidParameterError",
     "IterationRecord",
@@ -124,4 +122,5 @@ __all__ = [
     "to_pymeshlab",
     "to_recipe",
     "to_tubes",
+    "to_voxels",
 ]

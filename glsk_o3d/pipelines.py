@@ -11,7 +11,6 @@ from .data.skeleton import Skeleton
 from .filters.connector import Connector
 from .filters.contractor import Contractor
 from .filters.denoiser import Denoiser
-from .filters.inscriber import Inscriber
 from .filters.lpr_reducer import LPRReducer
 from .filters.outlier_remover import OutlierRemover
 from .filters.refiner import Refiner
@@ -57,7 +56,7 @@ def _published(**contraction: Any) -> Pipeline[Cloud, Skeleton]:
         Sampler(size="all", frame="box")
         | RingBuilder(k="published")
         | Contractor(line_hold=1, keep_last=False, retries=0, **contraction)
-        | Connector(radius="2%", thickness=0, links="nearest")
+        | Connector(radius="2%", thickness=0, links="nearest", shut=1)
         | Refiner(collapse="degree", handle=0, air=0, bridge=0, limb=0, spacing=0, recentre=0)
     )
 
@@ -91,7 +90,7 @@ def fast() -> Pipeline[Cloud, Skeleton]:
     """
     contractor = Contractor(max_iterations=2, initial_contraction=0.1)
     refiner = Refiner(recentre=0, handle=0.2, limb=0.35, air=0, bridge=0, set_aside=False)
-    return Sampler(size=800) | OutlierRemover() | RingBuilder() | contractor | Connector() | refiner
+    return Sampler(size=800) | OutlierRemover() | RingBuilder() | contractor | Connector(shut=1) | refiner
 
 
 def tree(root: str | Any = "z") -> Pipeline[Cloud, Skeleton]:
@@ -113,12 +112,12 @@ def tree(root: str | Any = "z") -> Pipeline[Cloud, Skeleton]:
     """
     if isinstance(root, np.ndarray):
         root = root.tolist()
-    return _graph() | Refiner(handle=1) | Tracer(root=tuple(root) if isinstance(root, list) else root)
+    return _graph(shut=1) | Refiner(handle=1) | Tracer(root=tuple(root) if isinstance(root, list) else root)
 
 
-def _graph() -> Pipeline[Cloud, Skeleton]:
+def _graph(**connection: Any) -> Pipeline[Cloud, Skeleton]:
     """The raw graph of `default`. Its merges wait for large clouds: which pairs they take hangs on the least change."""
-    return rings() | Contractor(reducer=LPRReducer(least=2 * CURVE.enough_points)) | Connector()
+    return rings() | Contractor(reducer=LPRReducer(least=2 * CURVE.enough_points)) | Connector(**connection)
 
 
 def rings() -> Pipeline[Cloud, Contraction]:
@@ -141,7 +140,7 @@ PIPELINES: dict[str, Callable[[], Pipeline[Cloud, Skeleton]]] = {
 BUILTIN: dict[str, type[Parameters]] = {
     cls.__name__: cls
     for cls in (
-        *(Sampler, OutlierRemover, Denoiser, Thinner, RingBuilder, Inscriber),
+        *(Sampler, OutlierRemover, Denoiser, Thinner, RingBuilder),
         *(Contractor, LPRReducer, Connector, Refiner, Tracer, ExplainedScore, RingSizeRatio),
     )
 }

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .analysis.correspondence import has_limb_elsewhere, same_branches
+from .analysis.correspondence import same_branches, same_one_by_one
 from .api import PipelineChoice, chosen_pipeline
 from .data.skeleton import Skeleton
 from .editing import transform
@@ -62,12 +62,12 @@ class Tracked:
 
 
 class Topology(NamedTuple):
-    """What frames vote about: the numbers of a graph, and whether one of its limbs is elsewhere."""
+    """What frames vote about: the numbers of a graph, and whether its branches are not those of the held one."""
 
     components: int
     loops: int
     leaves: int
-    is_elsewhere: bool = False
+    has_other_branches: bool = False
 
     @classmethod
     def of(cls, skeleton: Skeleton) -> Topology:
@@ -189,14 +189,14 @@ class Tracker:
         skeleton, held = self._pipeline(points), transform(self._held, self._pose)
         self._n_computed, self._n_explained = self._n_computed + 1, 0
         own, vote = Topology.of(held), Topology.of(skeleton)
-        if vote == own and (has_limb_elsewhere(skeleton, held) or has_limb_elsewhere(held, skeleton)):
-            vote = vote._replace(is_elsewhere=True)
+        if vote == own and not same_one_by_one(skeleton, held):
+            vote = vote._replace(has_other_branches=True)
         self._votes.append(vote)
         if vote == own and is_explained and self._average > 1:
             self._n_averaged = min(self._n_averaged + 1, self._average)
             self._hold(_averaged(held, skeleton, 1 / self._n_averaged), points)
         elif vote == own or self._is_elected(vote, own):
-            self._votes = deque((each._replace(is_elsewhere=False) for each in self._votes), self._votes.maxlen)
+            self._votes = deque((each._replace(has_other_branches=False) for each in self._votes), self._votes.maxlen)
             self._identity = self._identities(skeleton, held)
             self._n_averaged = 1
             self._hold(skeleton, points)

@@ -121,6 +121,14 @@ class TestCommands:
         ((_, _, (line, *_)),) = forest.stem_tables([rows[0], rows[1] | dict(failure="no")])
         assert line[1:3] == ["1", "1"]
 
+    def test_leaves(self, call, tmp_path):
+        out = call("leaves", "--trees", 2, "--jobs", 0, "-o", tmp_path / "l.json")
+        bare, leafy = json.loads((tmp_path / "l.json").read_text())["rows"]
+        assert bare["leaves"] == 0 < leafy["leaves"]
+        assert "leaf-off" not in bare["asked"]
+        assert "leaf-off" in leafy["asked"]
+        assert "leaves have more" in out
+
     def test_a_scan_beside_its_model(self, call, tmp_path):
         drawn = samples.tree(8000, forks=2, length=4, radius=0.2, seed=3)
         scan = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(drawn.points))

@@ -41,7 +41,6 @@ NAMES = {
     "filters": {
         "Preparing a cloud": ("Sampler", "OutlierRemover", "Denoiser", "Thinner"),
         "The five filters": ("RingBuilder", "Contractor", "LPRReducer", "Connector", "Refiner"),
-        "Narrow holes": ("Inscriber",),
         "Thin parts and trees": ("Tracer",),
         "When to stop": ("ExplainedScore", "RingSizeRatio"),
     },
@@ -58,7 +57,7 @@ NAMES = {
         "Writing and reading": ("save_recipe", "load_recipe", "to_recipe", "from_recipe"),
     },
     "io": {
-        "As objects of Open3D and pymeshlab": ("to_line_set", "to_tubes", "to_pymeshlab", "annotate"),
+        "As objects of Open3D and pymeshlab": ("to_line_set", "to_tubes", "to_voxels", "to_pymeshlab", "annotate"),
         "Clouds": ("read_cloud", "read_tensor_cloud", "read_sample", "annotate_file"),
         "Skeletons": ("read_skeleton", "save_skeleton", "read_truth"),
         "For other programs": ("save_rig",),

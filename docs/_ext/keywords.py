@@ -60,7 +60,6 @@ KEYWORDS = {
     "docs/filters/denoiser": "denoiser, denoise, denoising, ridge, mean shift",
     "docs/filters/thinner": "thinner, thin, thinning, too many points",
     "docs/filters/ring_builder": "ring builder, ringbuilder, rings, one-ring, neighbours, neighbors",
-    "docs/filters/inscriber": "inscriber, narrow holes, inscribed balls, medial axis",
     "docs/filters/contractor": "contractor, solver, weights",
     "docs/filters/lpr_reducer": "lpr reducer, lprreducer, lpr, reducer, reduction, local point reduction",
     "docs/filters/connector": "connector, connect, graph",

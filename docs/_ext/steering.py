@@ -9,7 +9,7 @@ PACKAGE = Path(__file__).resolve().parents[2] / "glsk_o3d"
 ROOMS = ("geometry", "curve")
 FILES = (
     "data/points",
-    *(f"filters/{name}" for name in ("sampler", "outlier_remover", "denoiser", "thinner", "ring_builder", "inscriber")),
+    *(f"filters/{name}" for name in ("sampler", "outlier_remover", "denoiser", "thinner", "ring_builder")),
     *(f"filters/{name}" for name in ("contractor", "lpr_reducer", "stopping", "connector", "refiner", "tracer")),
     "data/decisions",
 )

@@ -13,6 +13,7 @@ OUTLIER_DEVIATIONS = 3.0  # published: standard deviations beyond which residual
 LEAST_DEVIATION = 0.02  # fitted: of residuals, over the radius: bark, oval stems
 COVERED_DEGREES, COVERED_GAPS = 20.0, 6.0  # fitted: a gap is covered up to so many degrees, or median gaps
 LEAST_ARC_SHARE = 0.1  # fitted: of the points, on an arc between open gaps; fewer may be undergrowth
+WAVINESS = 0.01  # fitted: of a section, over its radius: bark and ovals, of which more points know no more
 MOST_PASSES = 20  # derived: the points that count are the same after a few
 
 
@@ -22,6 +23,7 @@ class CircleFit(NamedTuple):
     radius: float
     arc: float  # degrees with points
     points: int  # number of those that count
+    error: float  # standard deviation of the radius, over the radius
 
 
 def fit_circle(points: np.ndarray) -> CircleFit | None:
@@ -31,6 +33,8 @@ def fit_circle(points: np.ndarray) -> CircleFit | None:
     squares, Rousseeuw 1984), of many triples drawn. From there the sum of the squared distances is minimised
     (Levenberg-Marquardt) over the points no farther than three standard deviations, until these stay the same. A few
     points on another side do not count, where they would weigh most. None if there are fewer than four on a circle.
+    The error is that of least squares (Gauss 1823), for the noise of independent points and for waves of the section,
+    which count as one point's.
     """
     p = points - np.median(points, axis=0) if len(points) else points
     circle, counted = _circle_through_triple(p), np.zeros(len(p), bool)
@@ -49,7 +53,10 @@ def fit_circle(points: np.ndarray) -> CircleFit | None:
             break
         circle = least_squares(_residuals, circle, _jacobian, method="lm", args=(p[counted],)).x
     _, gaps, covered = _around(circle, p[counted])
-    return CircleFit(abs(float(circle[2])), float(gaps[covered].sum()), int(counted.sum()))
+    n, radius, jacobian = int(counted.sum()), abs(float(circle[2])), _jacobian(circle, p[counted])
+    variance = float(np.linalg.pinv(jacobian.T @ jacobian)[2, 2])  # of the radius, for distances of variance 1
+    noise = float((_residuals(circle, p[counted]) ** 2).sum()) / (n - 3) / radius**2
+    return CircleFit(radius, float(gaps[covered].sum()), n, float(np.sqrt(variance * (noise + n * WAVINESS**2))))
 
 
 def _circle_through_triple(p: np.ndarray) -> np.ndarray | None:

@@ -47,7 +47,7 @@ def _branch_under(upper: Skeleton, lower: Skeleton) -> np.ndarray:
     return np.where(shared.sum(axis=1) > ON_SHARE * length, shared.argmax(axis=1), -1)
 
 
-def has_limb_elsewhere(upper: Skeleton, lower: Skeleton) -> bool:
-    """Whether a branch of `upper` with a free end is no branch of `lower`."""
-    ends = np.array([path[[0, -1]] for path in upper.branches], int).reshape(-1, 2)
-    return bool(((upper.degree[ends] == 1).any(axis=1) & (same_branches(upper, lower) < 0)).any())
+def same_one_by_one(a: Skeleton, b: Skeleton) -> bool:
+    """Whether every branch of each is one of the other, and no two are the same."""
+    known = [len(np.setdiff1d(same_branches(*pair), [-1])) for pair in ((a, b), (b, a))]
+    return known == [len(a.branches), len(b.branches)] and len(a.branches) == len(b.branches)

@@ -11,18 +11,18 @@ from ..data.skeleton import Skeleton
 from ..errors import GlskError, SkeletonWarning
 from ..geometry.vectors import TINY
 from .circles import CircleFit
-from .crowns import crown_hulls, diameter_classes
+from .crowns import crown_hulls, diameter_classes, loose_points
 from .stems import stem
 
 BREAST_HEIGHT = 1.3  # published: metres above the ground at which foresters measure stems
 TALLEST_TREE = 116.07  # published: metres, Hyperion, the tallest tree known, as measured in 2019
 FORM_FACTOR = 2.0  # derived: wood over a cylinder as thick as at 1.3 m and as high as the tree; branches as thick as
 # the trunk together (Leonardo) that reach to the top fill one, and their bends and the foot do not double that
+MOST_ERROR = 0.05  # derived: of the diameter at 1.3 m, a tenth of the wood
 MOST_TRACED = 0.5  # derived: of the length; above that the volume says nothing of most of the tree
-NEEDS_LEAF_OFF = (
-    "has no surface, and no volume: twigs thinner than the points are apart, or leaves, which the cloud does not tell "
-    "apart: needs leaf-off, or more points"
-)
+MOST_FAR = 0.05  # fitted: of the points, far from the surface of bare wood
+LEAST_IN_ROWS = 0.55  # fitted: how much points off the wood are in rows, of bare twigs; those of leaves are less
+WITHOUT_SURFACE = "has no surface, and no volume: twigs thinner than the points are apart"
 
 
 @dataclass(frozen=True)
@@ -33,9 +33,9 @@ class TreeMeasures:
     ----------
     height : float
         Of the highest point above the foot of the stem, without points farther than three radii from the curve.
-    stem_diameter, stem_arc : float
-        Of the circle through the points of the stem in a slice of 10 cm across it, 1.3 m above the foot; degrees of it
-        with points. NaN without such a circle.
+    stem_diameter, stem_error, stem_arc : float
+        Of the circle through the points of the stem in a slice of 10 cm across it, 1.3 m above the foot; its standard
+        deviation, over the diameter; degrees of the circle with points. NaN without such a circle.
     crown_base : float
         Height at which the lowest branch leaves the stem; NaN without one.
     crown_area, crown_volume : float
@@ -61,6 +61,7 @@ class TreeMeasures:
 
     height: float
     stem_diameter: float
+    stem_error: float
     stem_arc: float
     crown_base: float
     crown_area: float
@@ -112,7 +113,8 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
     -----
     SkeletonWarning
         The root is in the upper half of the tree, the tree is taller than any known one or has too much wood for its
-        size, the diameter at 1.3 m is unknown, or most of the length has no surface.
+        size, the diameter at 1.3 m is unknown or of little certainty, most of the length has no surface, or there are
+        leaves.
 
     Examples
     --------
@@ -137,13 +139,18 @@ def tree_measures(skeleton: Any, root: Any = None, *, up: str | None = None, uni
     wood = float(volumes[~traced].sum())
     traced_share = known * float(lengths[traced].sum() / max(lengths.sum(), TINY))
     doubts = _doubts(-low / max(high - low, TINY), highest, section, problem, wood, tree.up, unit)
+    far, in_rows = loose_points(tree)
     if traced_share > MOST_TRACED:
-        doubts += (f"{100 * traced_share:.0f} % of the length {NEEDS_LEAF_OFF}",)
+        cause = "needs more points" if in_rows > LEAST_IN_ROWS else "or leaves: needs leaf-off, or more points"
+        doubts += (f"{100 * traced_share:.0f} % of the length {WITHOUT_SURFACE}, {cause}",)
+    elif far > MOST_FAR and in_rows <= LEAST_IN_ROWS:
+        doubts += (f"{100 * far:.0f} % of the points are far from the wood, and in no rows: leaves: needs leaf-off",)
     for doubt in doubts:
         warnings.warn(doubt, SkeletonWarning, stacklevel=2)
     return TreeMeasures(
         height=highest,
         stem_diameter=2 * section.radius,
+        stem_error=section.error,
         stem_arc=section.arc,
         crown_base=crown_base,
         crown_area=area,
@@ -188,6 +195,11 @@ def _doubts(
         )
     if problem and highest > BREAST_HEIGHT:
         doubts.append(f"the diameter of the stem at {BREAST_HEIGHT} m is not known: {problem}")
+    if section.error > MOST_ERROR:
+        doubts.append(
+            f"the diameter of the stem at {BREAST_HEIGHT} m has a standard deviation of {100 * section.error:.0f} %: "
+            f"points show {section.arc:.0f} degrees of it: scan it from other sides, too"
+        )
     share = volume / (np.pi * section.radius**2 * highest)
     if share > FORM_FACTOR:
         thick = f"{200 * section.radius:.3g} cm thick, as at {BREAST_HEIGHT} m"

@@ -15,9 +15,16 @@ from .gripper import Gripper
 CELL_NEIGHBOURS = 8  # measured: of 1230 approaches through sparse walls 11 seemed free with 4, 1 with 6, none with 8
 # derived: eight neighbours within half a finger's thickness leave a hole as wide as a finger with probability e^-10
 CLOSE_POINTS = 0.5
-CLEARANCES = (1, 2, 3)  # measured: how many to try; in noise of 0.5 % of the diagonal the first alone leaves few grasps
+CLEARANCES = (3, 2, 1)  # measured: how many to try; the wider the jaws open, the fewer meet a side that nobody has seen
 LEAST_CONTACT = 0.7  # fitted: cosine of the angle between jaws and surface; of steeper ones few hold
 SIDE_BEGINS = np.sqrt(3) / 2  # derived: where a side begins, over the radius: the cosine of 30 degrees
+
+
+class Surface(NamedTuple):
+    """The pieces of surface around N points that a gripper must not touch."""
+
+    pieces: np.ndarray  # (N, K, 3), places in each of them, of which the first is the point
+    spread: np.ndarray  # (N,), of these from the point at most
 
 
 class Approaches(NamedTuple):
@@ -37,35 +44,33 @@ class Approaches(NamedTuple):
 
 def check_approaches(
     approaches: Approaches,
-    points: np.ndarray,
+    surface: Surface | None,
     plane: np.ndarray | None,
     middle: np.ndarray,
     gripper: Gripper,
     clearance: float,
 ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray]:
-    """The obstacles of a gripper that is open one to three clearances wider than the part.
+    """The obstacles of a gripper that is open by three clearances more than the part, or where it is not free, by less.
 
-    `points` are those that it must not touch, none if they are not to be checked; `middle`, (m, 3), are on this side of
-    the plane, (4,), and an approach is as long as their diagonal. The obstacles, (P, A) bool arrays by name, are those
-    at the least opening, for approaches that are free at none. Three (P, A) arrays follow: the least opening at which
+    `surface` is what `surface_around` gives, None if it is not to be checked; `middle`, (m, 3), are on this side of the
+    plane, (4,), and an approach is as long as their diagonal. The obstacles, (P, A) bool arrays by name, are those
+    at the least opening, for approaches that are free at none. Three (P, A) arrays follow: the widest opening at which
     the approach is free, the depth of the fingertips past the axis, and the number of sides of the part that have
     points, as in `GraspCandidates`.
     """
     distance = float(np.linalg.norm(np.ptp(middle, axis=0)))
-    surface = cells(points, CLOSE_POINTS * min(gripper.finger[:2]))
     width, shape = approaches.sections.width, approaches.approach.shape[:2]
     depth = np.minimum(gripper.reach, approaches.sections.far)
     aside = approaches.sections.shift[..., None, None] * [1.0, 0, 0]
     too_wide = np.asarray(width + clearance > gripper.max_opening)
     slanted = approaches.sections.contact < LEAST_CONTACT
-    at_least_opening: dict[str, Any] = {}
     opening, sides_seen, free = np.full(shape, np.nan), np.zeros(shape, int), np.zeros(shape, bool)
     for times in CLEARANCES:
         wide = np.minimum(width + times * clearance, gripper.max_opening)
         low, high = (corner + aside for corner in swept(gripper, wide, depth, clearance, distance))
         possible = ~(free | too_wide | slanted)
         obstacles: dict[str, Any] = {"ways in where it is too wide": too_wide, "ways in to slanted sides": slanted}
-        if len(points):
+        if surface is not None:
             touching = hits(approaches, surface, low, high, possible).any(axis=2)
             possible &= ~touching
             first, last = (corner + aside for corner in sides(gripper, wide, depth, width))
@@ -79,8 +84,7 @@ def check_approaches(
         obstacles["ways in behind the plane"] = behind
         opening = np.where(possible, wide, opening)
         free |= possible
-        at_least_opening = at_least_opening or obstacles
-    blocked = {name: approach & ~free for name, approach in at_least_opening.items()}
+    blocked = {name: approach & ~free for name, approach in obstacles.items()}
     return blocked, opening, depth, sides_seen
 
 
@@ -111,6 +115,22 @@ def sides(gripper: Gripper, opening: np.ndarray, depth: np.ndarray, width: np.nd
     return np.array(low).transpose(2, 3, 0, 1), np.array(high).transpose(2, 3, 0, 1)
 
 
+def surface_around(
+    positions: np.ndarray, points: np.ndarray, gripper: Gripper, clearance: float, distance: float
+) -> Surface | None:
+    """What a gripper can touch on approaches from a distance to positions (P, 3); None without points."""
+    if len(points) == 0:
+        return None
+    pieces = cells(points, CLOSE_POINTS * min(gripper.finger[:2]))
+    spread = norm(pieces - pieces[:, :1]).max(axis=1)
+    if len(positions):
+        low, high = swept(gripper, np.array(gripper.max_opening), np.array(gripper.reach), clearance, distance)
+        reach = norm(np.maximum(-low, high)).max() + gripper.max_opening / 2 + spread
+        near = cKDTree(positions).query(pieces[:, 0])[0] <= reach
+        pieces, spread = pieces[near], spread[near]
+    return Surface(pieces, spread)
+
+
 def cells(points: np.ndarray, close: float) -> np.ndarray:
     """The piece of surface around each point: (N, K, 3) float array of places in it.
 
@@ -130,25 +150,23 @@ def cells(points: np.ndarray, close: float) -> np.ndarray:
 
 
 def hits(
-    approaches: Approaches, surface: np.ndarray, low: np.ndarray, high: np.ndarray, possible: np.ndarray
+    approaches: Approaches, surface: Surface, low: np.ndarray, high: np.ndarray, possible: np.ndarray
 ) -> np.ndarray:
     """Which boxes have pieces of surface in them, (P, A, B) bool array, of the approaches that are `possible`, (P, A).
 
-    `surface` is what `cells` gives; `low` and `high`, (P, A, B, 3), are corners in the frame of the gripper: x closing,
-    y axis of the part, z approach.
+    `low` and `high`, (P, A, B, 3), are corners in the frame of the gripper: x closing, y axis of the part, z approach.
     """
     hit = np.zeros((*possible.shape, low.shape[2]), bool)
-    if not (len(surface) and possible.any()):
-        return hit
-    reach = norm(np.maximum(np.abs(low), np.abs(high))).max() + norm(surface - surface[:, :1]).max()
-    surface = surface[cKDTree(approaches.position).query(surface[:, 0], distance_upper_bound=reach)[0] <= reach]
+    reach, across = norm(np.maximum(np.abs(low), np.abs(high))), np.maximum(-low[..., 1], high[..., 1])
     for place in np.flatnonzero(possible.any(axis=1)):
         rows, position, axis = np.flatnonzero(possible[place]), approaches.position[place], approaches.axis[place]
-        first, last = _ends(surface @ axis - position @ axis)
-        near = np.flatnonzero((last > low[place, :, :, 1].min()) & (first < high[place, :, :, 1].max()))
-        offset = surface[near] - position
+        centre = surface.pieces[:, 0] - position
+        near = np.abs(centre @ axis) < across[place].max() + surface.spread
+        near &= norm(centre) <= reach[place].max() + surface.spread
+        offset = surface.pieces[near] - position
+        first, last = _ends(offset @ axis)
         x, z = offset @ approaches.closing[place, rows].T, offset @ approaches.approach[place, rows].T
-        least, most = zip(_ends(x), (first[near, None], last[near, None]), _ends(z), strict=True)
+        least, most = zip(_ends(x), (first[:, None], last[:, None]), _ends(z), strict=True)
         for box in range(low.shape[2]):
             inside = [(most[i] > low[place, rows, box, i]) & (least[i] < high[place, rows, box, i]) for i in range(3)]
             hit[place, rows, box] = (inside[0] & inside[1] & inside[2]).any(axis=0)

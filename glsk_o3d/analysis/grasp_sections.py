@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,16 +34,26 @@ class Sections(NamedTuple):
         return Sections(*(values[rows] for values in self))
 
 
+def in_time(rows: Iterable[int], stop: float) -> Iterator[int]:
+    """The first row in any case, and the others until a time of the monotonic clock."""
+    for count, row in enumerate(rows):
+        if count and time.monotonic() > stop:
+            return
+        yield row
+
+
 def sections_at(
     skeleton: Skeleton,
     branch: np.ndarray,
     places: np.ndarray,
     directions: tuple[np.ndarray, np.ndarray],
     gripper: Gripper,
-) -> Sections:
+    rows: Iterable[int],
+) -> tuple[Sections, np.ndarray]:
     """The sections of the part at places on branches (P,), for `directions` of approach and closing, (P, A, 3) each.
 
-    The places, (P, 9), are positions, axes, radii and their slopes along the branch, and confidences.
+    The places, (P, 9), are positions, axes, radii and their slopes along the branch, and confidences. Those of `rows`
+    are examined, others are taken for round; which were is a (P,) bool array.
 
     The points of the branch show it, as far as half the width of a finger to either side of the place, and along the
     approach as far as the fingertips reach. An unseen side is as far from the axis as the side across;
@@ -59,15 +71,17 @@ def sections_at(
     points_of = csr_array(
         (np.ones(len(known)), (whole.vertex_of_point[known], known)), (len(skeleton.vertices), len(whole.points))
     )
-    for place, number in enumerate(branch.tolist()):
-        path = skeleton.branches[number]
+    is_examined = np.zeros(len(branch), bool)
+    for place in rows:
+        is_examined[place] = True
+        path = skeleton.branches[branch[place]]
         local = path[norm(skeleton.vertices[path] - position[place]) <= SECTION_REACH * np.fmax(half[place], across)]
-        rows = points_of[np.unique(local)].indices
-        offset = whole.points[rows] - position[place]
+        near_points = points_of[np.unique(local)].indices
+        offset = whole.points[near_points] - position[place]
         near = abs(offset @ axis[place]) < across / 2
         if near.sum() < FEWEST or not half[place] > 0:
             continue
-        offset, normal = offset[near], whole.normals[rows[near]]
+        offset, normal = offset[near], whole.normals[near_points[near]]
         approach, closing = (offset @ vectors[place].T for vectors in directions)  # (n, A)
         far, near_palm = np.maximum([approach.max(axis=0), -approach.min(axis=0)], 0)
         far = result.far[place] = np.where(far > SEEN_SIDE * near_palm, far, near_palm)
@@ -86,4 +100,4 @@ def sections_at(
         ends = np.where(seen, ends, ends[::-1])
         result.width[place], result.shift[place] = ends.sum(axis=0), (ends[1] - ends[0]) / 2
         result.contact[place] = np.where(seen, touched, 1).min(axis=0)
-    return result
+    return result, is_examined

@@ -3,9 +3,7 @@
 import time
 import warnings
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,16 +21,17 @@ from ..geometry.neighbourhoods import nearest_neighbours, principal
 from ..geometry.polylines import arc_lengths
 from ..parameters import check_number
 from .curves import check_places
-from .grasp_checks import Approaches, check_approaches, checked_plane
-from .grasp_sections import sections_at
+from .grasp_checks import Approaches, check_approaches, checked_plane, surface_around
+from .grasp_sections import in_time, sections_at
 from .gripper import GraspCandidates, Gripper, in_words
 
 TABLE_SHARE = 0.05  # fitted: of the opening, the distance from a plane up to which points are of the table
-PLACES_AT_ONCE = 32  # speed: after how many places the clock is read
+SECTIONS_SHARE = 0.5  # speed: of the time at most, for what the parts are like; the rest is for ways in
 WALL_POINTS = 16  # fitted: neighbours among outliers that show whether they form a wall
 WALL_FLATNESS = 0.01  # fitted: third over first principal spread of outliers that form a wall
 TURNS_PER_STEP = 2  # fitted: directions per approach direction, one of which is across the thin side of a flat part
 FLAT_PART = 0.9  # fitted: width across the thin side of a flat part, over that in the usual directions
+BEYOND = "places beyond the budget"
 UNLIKELY_OPENING = 20.0  # derived: openings over diagonals: above those of hands and screws, below those of mm and m
 
 
@@ -77,8 +76,9 @@ def grasp_candidates(
         A table, as from Open3D's ``segment_plane``: solid behind it as seen from the object. It stands for the points
         that are up to a twentieth of the opening away from it.
     clearance : float, optional
-        Opening beyond the width w [cloud's units], half on either side; twice or three times as much where less is not
-        free, as in noise. Half of it is also kept all around the gripper. By default a tenth of the widest opening.
+        Opening beyond the width w [cloud's units], half on either side; twice or three times as much where that is
+        free, as sides that nobody has seen may be wider. Half of it is also kept all around the gripper. By default a
+        tenth of the widest opening.
     around : int
         Approach directions at each place, evenly around the axis; the first is as near as possible to -z, or turned by
         half a step where this is across the thin side.
@@ -95,8 +95,8 @@ def grasp_candidates(
     max_places : int, optional
         Places to search, the most promising ones by confidence, width and contact.
     seconds : float, optional
-        Wall time after which no further places are searched, these most promising ones first. At least one round of 32
-        places is.
+        Wall time after which no further place is searched, these most promising ones first. The first one is in any
+        case, and so are the points prepared for it.
 
     Returns
     -------
@@ -130,7 +130,7 @@ def grasp_candidates(
     gripper = gripper if isinstance(gripper, Gripper) else Gripper(gripper)
     clearance = gripper.max_opening / 10 if clearance is None else clearance
     _check(skeleton, clearance, around, spacing, min_confidence, accept, max_places, seconds, outlier_factor)
-    stop = np.inf if seconds is None else time.monotonic() + seconds
+    start, budget = time.monotonic(), np.inf if seconds is None else seconds
     plane = None if plane is None else checked_plane(plane)
     points, middle = _obstacles(skeleton, cloud, mask, outlier_factor)
     if plane is not None:  # it stands for the points of the table
@@ -140,16 +140,16 @@ def grasp_candidates(
     accepted = _is_accepted(skeleton, accept)
     skeleton = skeleton if accepted else replace(skeleton, edges=np.empty((0, 2), int))
     place, branch, approaches, left_out, examined = _graspable_places(
-        skeleton, gripper, clearance, around, spacing, min_confidence
+        skeleton, gripper, clearance, around, spacing, min_confidence, start + SECTIONS_SHARE * budget
     )
     sections = approaches.sections
     confidence = np.nan_to_num(place[:, 8], nan=1.0)[:, None]
     quality = confidence * np.clip(1 - sections.width / gripper.max_opening, 0, None) * sections.contact
     ranked = np.argsort(-quality.max(axis=1, initial=0).round(9), kind="stable")[:max_places]
-    search = partial(check_approaches, points=points, plane=plane, middle=middle, gripper=gripper, clearance=clearance)
-    opening, depth, seen, blocked, unsearched = _searched(search, approaches, ranked, stop)
-    if unsearched:
-        left_out["places beyond the budget"] = unsearched
+    distance = float(np.linalg.norm(np.ptp(middle, axis=0)))
+    surface = surface_around(approaches.position, points, gripper, clearance, distance)
+    around_it = (surface, plane, middle, gripper, clearance)
+    opening, depth, seen, blocked = _searched(approaches, ranked, around_it, start + budget)
     free = np.flatnonzero(np.isfinite(opening))
     if len(points):
         quality = quality * seen / 3
@@ -172,7 +172,7 @@ def grasp_candidates(
         seen=seen.ravel()[free],
         gripper=gripper,
         places=examined,
-        left_out=left_out | blocked,
+        left_out=dict(Counter(left_out) + blocked),
     )
     if len(candidates) == 0 and accepted:
         reason = in_words(candidates.left_out) or "the skeleton has no branch"
@@ -181,24 +181,23 @@ def grasp_candidates(
 
 
 def _searched(
-    search: Callable[[Approaches], Any], approaches: Approaches, ranked: np.ndarray, stop: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict[str, int], int]:
-    """Opening, depth and number of seen sides of approaches, by a search of places in their rank until a time.
+    approaches: Approaches, ranked: np.ndarray, around_it: tuple[Any, ...], stop: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, Counter[str]]:
+    """Opening, depth and number of seen sides of approaches, by a check of places in their rank until a time.
+
+    `around_it` is what `check_approaches` takes further.
 
     The opening is NaN of those that are not free. The obstacles are counted, and so are the places not searched.
     """
     shape = approaches.approach.shape[:2]
     opening, depth, seen = np.full(shape, np.nan), np.zeros(shape), np.zeros(shape, int)
-    blocked: Counter[str] = Counter()
-    unsearched = shape[0]
-    for first in range(0, len(ranked), PLACES_AT_ONCE):
-        if first and time.monotonic() > stop:
-            break
-        rows = ranked[first : first + PLACES_AT_ONCE]
-        obstacles, opening[rows], depth[rows], seen[rows] = search(approaches.of(rows))
+    blocked, unsearched = Counter[str](), shape[0]
+    for row in in_time(ranked, stop):
+        obstacles, opening[row], depth[row], seen[row] = check_approaches(approaches.of([row]), *around_it)
         blocked.update(_remaining(obstacles)[1])
-        unsearched -= len(rows)
-    return opening, depth, seen, blocked, unsearched
+        unsearched -= 1
+    blocked[BEYOND] = unsearched
+    return opening, depth, seen, blocked
 
 
 def _check_units(gripper: Gripper, middle: np.ndarray) -> None:
@@ -226,10 +225,11 @@ def _graspable_places(
     around: int,
     spacing: float | None,
     min_confidence: float,
+    stop: float,
 ) -> tuple[np.ndarray, np.ndarray, Approaches, dict[str, int], int]:
     """Places that fit between the jaws: as of `_places_on`, with branch and approaches; the others are counted.
 
-    The counts are those of the rejected places, by reason, and of all examined ones.
+    The counts are those of the rejected places, by reason, and of all places. The time is over at `stop`.
     """
     places = [_places_on(skeleton, path, spacing, gripper.finger[1]) for path in skeleton.branches]
     counts = np.array(list(map(len, places)), int)
@@ -237,13 +237,17 @@ def _graspable_places(
     finer = TURNS_PER_STEP if around > 1 else 1
     approach = _directions_around(place[:, 3:6], finer * around)
     closing = np.cross(place[:, None, 3:6], approach)
-    sections = sections_at(skeleton, branch, place, (approach, closing), gripper)
+    confidence = place[:, 8]
+    promise = np.nan_to_num(confidence, nan=1.0) * (1 - 2 * np.nan_to_num(place[:, 6]) / gripper.max_opening)
+    rows = in_time(np.argsort(-promise, kind="stable"), stop)
+    sections, is_examined = sections_at(skeleton, branch, place, (approach, closing), gripper, rows)
     turn = _turn_across(sections.width, around)
     columns = (finer * np.arange(around) + turn[:, None]) % (finer * around)
     every = np.arange(len(place))[:, None], columns
     approaches = Approaches(place[:, :3], place[:, 3:6], approach[every], closing[every], sections.of(every))
-    width, confidence = approaches.sections.width.min(axis=1), place[:, 8]
+    width = approaches.sections.width.min(axis=1)
     reasons = {
+        BEYOND: ~is_examined,
         "unknown radius": np.isnan(width),
         "too wide": width + clearance > gripper.max_opening,
         "uncertain": ~(confidence >= min_confidence) if min_confidence > 0 else np.zeros(len(width), bool),

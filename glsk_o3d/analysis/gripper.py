@@ -92,8 +92,8 @@ class GraspCandidates(Rows, row="grasp"):
         On the axis, midway between the jaws; direction of the approach, perpendicular to the axis; from jaw to jaw,
         perpendicular to both.
     opening, depth : (G,) float arrays
-        Between the jaws during the approach: the width of the part plus one to three clearances. Distance of the
-        fingertips past the position.
+        Between the jaws during the approach: the width of the part plus three clearances, or two or one where more is
+        not free. Distance of the fingertips past the position.
     branch : (G,) int array
         Position in `Skeleton.branches`.
     confidence, quality : (G,) float arrays

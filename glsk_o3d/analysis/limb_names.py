@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..curve.merging import merge_into
 from ..data.skeleton import Skeleton
 from ..geometry.groups import group_rank
 from ..geometry.vectors import TINY, Floats, norm
@@ -19,29 +20,59 @@ def bone_names(bones: Skeleton, plane: Plane | None = None, up: str = "z", sides
     """Names of the bones of an armature that is numbered from its root: of their branch, and their number on it.
 
     With a plane of symmetry, two or four feet in mirrored pairs and a head in the plane make a body. Its parts are
-    head, neck, spine, tail, leg and arm, or front_leg and hind_leg; other branches have their number. Names of limbs
-    end in ``_left`` or ``_right``, and with `sides` those of all branches that are mirror images of each other.
+    head, neck, spine, tail, leg and arm, or front_leg and hind_leg; other branches have their number. Fingers and toes
+    are part of their limb. Names of limbs end in ``_left`` or ``_right``, and with `sides` those of all branches that
+    are mirror images of each other.
     """
-    branch, count = bones.branch_of_edge, len(bones.branches)
+    named: dict[int, str] = {}
+    if plane is not None:
+        fork = _fork_of_prongs(bones, plane, LEAST_ARM * float(np.ptp(bones.vertices @ VERTICAL[up])))
+        limbs = merge_into(bones, fork)
+        partner = mirrored_branches(limbs, plane)
+        named, ahead = _limbs(limbs, partner, up)
+    if not named:
+        limbs, fork, ahead = bones, np.arange(len(bones.vertices)), FRONT[up]
+        partner = np.full(len(bones.branches), -1) if plane is None else mirrored_branches(bones, plane)
+    branch, count, left = limbs.branch_of_edge, len(limbs.branches), np.cross(VERTICAL[up], ahead)
     labels, suffixes = {row: f"branch_{row}" for row in range(count)}, [""] * count
-    partner = np.full(count, -1) if plane is None else mirrored_branches(bones, plane)
-    named, ahead = ({}, FRONT[up]) if plane is None else _limbs(bones, partner, up)
-    left = np.cross(VERTICAL[up], ahead)
     for i, j in enumerate(partner.tolist()):
         if i < j and (sides or i in named):
-            first, second = (bones.vertices[bones.branches[row]].mean(axis=0) @ left for row in (i, j))
+            first, second = (limbs.vertices[limbs.branches[row]].mean(axis=0) @ left for row in (i, j))
             suffixes[i], suffixes[j] = ("_left", "_right") if first > second else ("_right", "_left")
             labels[j] = labels[i]
     labels |= named
-    label_of_bone = [labels[row] for row in branch.tolist()]
-    of_head = [bone for bone, label in enumerate(label_of_bone) if label == "head"]
-    at_end = [bone for bone in of_head if bones.degree[bones.edges[bone]].min() == 1]
+    named_bones = [(labels[row], suffixes[row]) for row in branch.tolist()]
+    of_head = [bone for bone, (label, _) in enumerate(named_bones) if label == "head"]
+    at_end = [bone for bone in of_head if limbs.degree[limbs.edges[bone]].min() == 1]
     if at_end and "neck" not in named.values():  # the head's branch begins at the shoulders
         for bone in {*of_head} - {*at_end}:
-            label_of_bone[bone] = "neck"
-    named_bones = [*zip(label_of_bone, [suffixes[row] for row in branch], strict=True)]
-    numbers = group_rank(np.unique(named_bones, axis=0, return_inverse=True)[1].reshape(-1), len(branch))
+            named_bones[bone] = "neck", ""
+    # a prong is called as the bone that leads to its fork
+    ends = bones.edges[:, 1]
+    of_vertex = dict(zip(ends[fork[ends] == ends].tolist(), named_bones, strict=True))
+    named_bones = [of_vertex[end] for end in fork[ends].tolist()]
+    numbers = group_rank(np.unique(named_bones, axis=0, return_inverse=True)[1].reshape(-1), len(named_bones))
     return [f"{label}.{number:03d}{side}" for (label, side), number in zip(named_bones, numbers.tolist(), strict=True)]
+
+
+def _fork_of_prongs(bones: Skeleton, plane: Plane, least: float) -> np.ndarray:
+    """The vertex where each prong leaves its limb, of other vertices itself, (M,) int array.
+
+    A limb forks at its end, beside the plane, where no way to a tip is as long as an arm at least is. It goes on in the
+    longest one; others are prongs, such as fingers.
+    """
+    fork, longest = np.arange(len(bones.vertices)), np.arange(len(bones.vertices))
+    reach, outwards = np.zeros(len(fork)), np.argsort(bones.edges[:, 1], kind="stable")
+    for edge in outwards[::-1].tolist():
+        (start, end), length = bones.edges[edge].tolist(), bones.edge_lengths[edge]
+        if reach[end] + length > reach[start]:
+            reach[start], longest[start] = reach[end] + length, end
+    beside = np.abs((bones.vertices - plane.point) @ plane.normal) > bones.radii
+    forks = (bones.degree > 2) & (reach < least) & beside & (fork > 0)  # no limb leads to the root
+    for start, end in bones.edges[outwards].tolist():
+        if fork[start] != start or (forks[start] and longest[start] != end):
+            fork[end] = fork[start]
+    return fork
 
 
 def _limbs(bones: Skeleton, partner: np.ndarray, up: str) -> tuple[dict[int, str], Floats]:

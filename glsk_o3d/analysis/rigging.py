@@ -34,9 +34,10 @@ def armature(forest: Skeleton, joints: int | None = None, plane: Plane | None = 
     has its next joint where it leaves the junction's ball, a pair of limbs equally far from it. Unknown radii count as
     0: then all vertices are joints. Vertex 0 stays the root, and numbers lead outwards.
 
-    If a number of `joints` is given, these are the root, the ends and the junctions, and then the places that tell most
-    of the curve: the farthest bends and the middles of long bones. With a `plane` of symmetry, joints of two branches
-    that are mirror images of each other are, too, and those of a branch that is its own image are in the plane.
+    If a number of `joints` is given, there are so many bones, each of which turns about its joint: between the root,
+    the ends, the junctions, and the places that tell most of the curve: the farthest bends, middles of long bones. With
+    a `plane` of symmetry, joints of two branches that are mirror images of each other are, too, and those of a branch
+    that is its own image are in the plane.
     """
     whole, root = _without_junctions_in_balls(forest)
     sets, ends = _mirrored_sets(whole, plane), whole.degree != 2
@@ -44,7 +45,7 @@ def armature(forest: Skeleton, joints: int | None = None, plane: Plane | None = 
         forks = [whole.degree[each.path[[0, -1]]] > 2 for each in sets]
         lengths = [_joints_along(each, fork, each.path == root) for each, fork in zip(sets, forks, strict=True)]
     else:
-        lengths = _telling_lengths(sets, int(ends.sum()), root, joints)
+        lengths = _telling_lengths(sets, int(ends.sum()) - whole.n_components, root, joints)
     joint = np.where(ends, np.cumsum(ends) - 1, -1)  # of each vertex
     end_places = whole.vertices.copy()
     places, radii, edges, n = [], [whole.radii[ends]], [np.empty((0, 2), int)], int(ends.sum())
@@ -87,12 +88,15 @@ def _mirrored_sets(skeleton: Skeleton, plane: Plane | None) -> list[_MirroredSet
 
 
 def _telling_lengths(sets: list[_MirroredSet], n: int, root: int, joints: int) -> list[np.ndarray]:
-    """Lengths along the curves of sets of branches of the joints that tell most of the curve, so many with n ends."""
+    """Lengths along the curves of sets of branches of the places that tell most of the curve.
+
+    There are so many bones as `joints`; with only the ends, the junctions and the root there would be n, or one more.
+    """
     kept = [np.union1d([0, len(each.curve) - 1], np.flatnonzero(each.path == root)) for each in sets]
     n += sum((len(rows) - 2) * len(each.rows) for rows, each in zip(kept, sets, strict=True))
     if joints < n:
         raise InvalidParameterError(
-            f"joints = {joints}: the skeleton has {n} ends and junctions, the root among them: ask for as many, "
+            f"joints = {joints}: between its ends, junctions and root the skeleton has {n} bones: ask for as many, "
             "or drop branches first (editing.prune, --prune-length)"
         )
     weights = [

@@ -20,7 +20,7 @@ FEWEST_ON_CIRCLE = 12  # fitted: on a circle, of which fewer may be anything
 LEAST_ARC = 60.0  # derived: degrees of a circle; a chord of less leaves the surface by an eighth of the radius
 TAPER_STEPS = 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0  # published: metres between the sections of a stem
 MOST_TAPER_SECTIONS = 20  # precision: of a taper, with the shortest of these steps that needs no more
-UNKNOWN = CircleFit(np.nan, np.nan, 0)
+UNKNOWN = CircleFit(np.nan, np.nan, 0, np.nan)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,7 @@ class Stem:
         return 2 * self.circle_at(height)[0].radius
 
     def taper(self) -> tuple[dict[str, float], ...]:
-        """Height, diameter, arc and diameter of the cylinder, each by its name, at round heights: up to twenty."""
+        """Height, diameter, its error, arc, diameter of the cylinder, by their names, at up to twenty round heights."""
         step = next(
             (step for step in TAPER_STEPS if self.top < step * (MOST_TAPER_SECTIONS + 1)),
             self.top / MOST_TAPER_SECTIONS,
@@ -87,7 +87,7 @@ class Stem:
             if row is not None:
                 circle = self.circle_at(height)[0]
                 thickness = 2 * self.unit * float(self.pieces.radius[row])
-                section = dict(height=height, diameter=2 * circle.radius, arc=circle.arc)
+                section = dict(height=height, diameter=2 * circle.radius, error=circle.error, arc=circle.arc)
                 sections.append(section | {"cylinder_diameter": thickness})
         return tuple(sections)
 

@@ -89,7 +89,7 @@ def rig(
     skeleton: SkeletonFile,
     output: Annotated[Path, output_option("FILE", "The rig: glb.")],
     mesh: Annotated[Path | None, argument("MESH", "A mesh or a cloud; by default the skeleton's tubes.")] = None,
-    joints: Annotated[int | None, option("N", "How many joints: ends, junctions, then bends.", min=2)] = None,
+    joints: Annotated[int | None, option("N", "How many joints, each with its bone.", min=1)] = None,
     symmetric: Annotated[bool, Option("--symmetric", help="Joints left and right are mirror images.")] = False,
     root: Annotated[Any, root_option("Which joint moves all others")] = None,
     cut_loops: Annotated[bool, Option("--cut-loops", help="Cut loops open; the surface stays whole.")] = False,
@@ -102,14 +102,14 @@ def rig(
     """
     from .. import FileFormatError, read_cloud, read_skeleton, save_rig
     from ..io.formats.gltf import RIG_ENDING
-    from ..io.scans import read_mesh
+    from ..io.scans import read_textured_mesh
 
     check_outputs([Output(output, (RIG_ENDING,), "rig is glTF", save_rig)], skeleton, mesh)
     curve = read_skeleton(skeleton)
     surface: Any = None
     if mesh is not None:
         try:
-            surface = read_mesh(mesh)
+            surface = read_textured_mesh(mesh)
         except FileFormatError:
             surface = read_cloud(mesh)  # knows best what else may be wrong with the file
     bones = save_rig(curve, output, surface, joints=joints, symmetric=symmetric, cut_loops=cut_loops, root=root, up=up)

@@ -105,6 +105,11 @@ def grasps(
     cloud: Annotated[Path | None, option("FILE", "Points not to touch; by default those of the skeleton.")] = None,
     plane: Annotated[str | None, option("A,B,C,D", "A table, ax + by + cz + d = 0.")] = None,
     min_confidence: Annotated[float, option("SHARE", "Of the skeleton, from 0 to 1.")] = 0.25,
+    accept: Annotated[
+        str, option("VERDICT", "Worst of a skeleton that gets grasps: good, doubtful or 'no curve skeleton'.")
+    ] = "doubtful",
+    max_places: Annotated[int | None, option("N", "Search so many places, the most promising ones.", min=1)] = None,
+    seconds: Annotated[float | None, option("SECONDS", "Stop after this time, the best places first.", min=0)] = None,
     count: Annotated[int, option("N", "How many to show and write, of each place its best first.", "-n", min=1)] = 20,
     output: Annotated[list[Path] | None, output_option("FILE", "json or csv; may be repeated.")] = None,
 ) -> None:
@@ -127,6 +132,9 @@ def grasps(
         cloud=None if cloud is None else read_cloud(cloud),
         plane=None if plane is None else plane.split(","),
         min_confidence=min_confidence,
+        accept=accept,
+        max_places=max_places,
+        seconds=seconds,
     )
     best, n = candidates[:count], len(candidates)
     facts = {"skeleton": str(skeleton), "found": n, **best.as_dict()}

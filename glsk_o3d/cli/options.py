@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from typer import Argument, Option
 
-SKELETON_ENDINGS = ["ply", "obj", "json", "npz", "swc", "vtp", "glb", "urdf"]
+SKELETON_ENDINGS = ["ply", "obj", "json", "npz", "swc", "vtp", "dxf", "graphml", "glb", "urdf"]
 """Endings of skeletons; written out, since the table of formats is slow to import."""
 TREE_ENDINGS = ["swc", "glb", "urdf"]
 """Endings of formats that hold only trees."""

@@ -112,7 +112,7 @@ def _ball(curve: Curve) -> Reason | None:
 
 
 def _stubs(curve: Curve) -> Reason | None:
-    """Components with most of the points are hardly longer than thick."""
+    """Components with most of the points are hardly longer than thick, and have no loop to go round."""
     cloud, n = curve.cloud, curve.n_components
     component, size, points = _by_component(curve)
     mean = group_sum(points, component, n) / np.maximum(size, 1)
@@ -120,7 +120,9 @@ def _stubs(curve: Curve) -> Reason | None:
     spread = group_sum(products, component, n) / np.maximum(size, 1)[:, :, None] - mean[:, :, None] * mean[:, None]
     length = np.sqrt(12 * np.maximum(np.linalg.eigvalsh(spread)[:, 2], 0))
     reach = group_median(norm(cloud.offset), component, n)
-    share = float(size[length < CURVE.stub * reach].sum() / len(cloud.vertex))
+    edges = np.bincount(curve.component_of_vertex[curve.edges[:, 0]], minlength=n)
+    is_tree = edges < np.bincount(curve.component_of_vertex, minlength=n)
+    share = float(size[is_tree & (length < CURVE.stub * reach)].sum() / len(cloud.vertex))
     text = (
         f"sphere-like: parts with {share:.0%} of the points are hardly longer than thick, "
         "so no curve skeleton is meaningful there"

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from ..data.derived import Changeable, derived
 from ..geometry.cycles import inscribed_circle
 from ..geometry.diffusion import Diffusion
-from ..geometry.groups import first_in_their_place, quantile
+from ..geometry.groups import component_labels, first_in_their_place, quantile
 from ..geometry.morton import morton_order
 from ..geometry.neighbourhoods import nearest_neighbours, uprightness
 from ..geometry.polylines import incident_edges, nearest_on_edges, places_on_edges
@@ -70,10 +70,27 @@ class Surface(Changeable):
 
     def oriented(self, curve: Curve) -> Surface:
         """The same with normals that point away from a curve that has edges and was fitted to these points."""
-        edge, t = _nearest_edges(curve, self.supporting)
-        axis = np.where(edge[:, None] >= 0, places_on_edges(curve.vertices, curve.edges, edge, t), self.points)
-        normals = orient_from_axis(self.points, curve.normals[self.supporting], axis, self.neighbours)
+        normals = self._outwards(curve, self._axis(curve))
         return self.changed(normals=normals, _windings=Memo(), _circles=Memo())
+
+    def _axis(self, curve: Curve) -> np.ndarray:
+        edge, t = _nearest_edges(curve, self.supporting)
+        return np.where(edge[:, None] >= 0, places_on_edges(curve.vertices, curve.edges, edge, t), self.points)
+
+    def _outwards(self, curve: Curve, axis: np.ndarray) -> np.ndarray:
+        return orient_from_axis(self.points, curve.normals[self.supporting], axis, self.neighbours)
+
+    def facing(self, curve: Curve) -> tuple[int, float]:
+        """Points of the largest patch that faces a curve with edges, and the share of all that do.
+
+        Outside of an axis the surface faces away from it. Walls of a hole that was closed, and flanks of a limb that
+        was lost, face the curve beside them in patches, and noise here and there.
+        """
+        axis = self._axis(curve)
+        faces = dot(self._outwards(curve, axis), self.points - axis) < 0
+        links = np.column_stack([np.repeat(np.arange(len(faces)), self.neighbours.shape[1]), self.neighbours.ravel()])
+        label = component_labels(len(faces), links[faces[links].all(axis=1)])
+        return int(np.bincount(label[faces]).max(initial=0)), float(faces.mean())
 
     @derived("points", "neighbours")
     def diffusion(self) -> Diffusion:

@@ -137,8 +137,13 @@ class Report:
         distinct points of the sample, and contracted points.
     noise : float
         Mean share of noise of the neighbourhoods, from 0 to 1.
+    on_medial_axis : bool
+        Whether the graph is that of the medial axis, whose loops and pieces are those of the solid.
     n_loops_closed, n_cuts, n_bridges : int
         Probable non-handles that were closed, branches that were cut because they probably cross air, and bridged gaps.
+    n_facing, facing : int, float
+        Of a sample of the points, those of the largest patch whose surface faces its own curve, as walls of a closed
+        hole and flanks of a lost limb do, and the share of all that do.
     n_traced : int
         Input points without a surface, whose parts were traced along shortest paths.
     joined : tuple of ((x, y, z), (x, y, z))
@@ -183,9 +188,12 @@ class Report:
     n_distinct: int = 0
     n_contracted: int = 0
     noise: float = 0.0
+    on_medial_axis: bool = False
     n_loops_closed: int = 0
     n_cuts: int = 0
     n_bridges: int = 0
+    n_facing: int = 0
+    facing: float = 0.0
     n_traced: int = 0
     joined: tuple[tuple[Place, Place], ...] = ()
     root: tuple[float, ...] = ()

@@ -126,11 +126,12 @@ class Skeleton(SpaceCurve):
     def score(self) -> float:
         """Probability that the graph is right, 0 to 1: components, loops and all ends. NaN if unknown.
 
-        By how certain the decisions about the topology are, and by the confidence of the vertices. Of random shapes
-        with a score about s, a share of about s is right; where narrow holes or stout limbs are lost before anything is
-        asked, it is too high.
+        By how certain the decisions about the topology are, by the confidence of the vertices, and by how much of the
+        surface faces its own curve, as where narrow holes or stout limbs are lost before anything is asked. Of random
+        shapes with a score about s, a share of about s is right.
         """
-        return graph_score(self.report.decisions, self.confidence)
+        report = self.report
+        return graph_score(report.decisions, self.confidence, report.n_facing, report.facing)
 
     @derived("report", "confidence", "vertices", "edges")
     def branch_scores(self) -> np.ndarray:
@@ -150,7 +151,9 @@ class Skeleton(SpaceCurve):
     @property
     def reasons(self) -> tuple[Reason, ...]:
         """Why not to rely on it: those of the report, and a low or unknown score."""
-        return (*self.report.reasons, *reasons_of_score(self.score, self.report.decisions))
+        report = self.report
+        of_score = reasons_of_score(self.score, report.decisions, report.n_facing, report.facing)
+        return (*report.reasons, *of_score)
 
     @property
     def verdict(self) -> Verdict:

@@ -13,7 +13,8 @@ from ..geometry.groups import quantile
 from .decisions import Decision, logistic
 
 # Fitted on random tubes, frames, trees, figures, things, stout toys and rings, with damage as of scanners.
-SCORE = dict(constant=-5.9, topology=3.2, limb=4.9, confidence=1.4)
+SCORE = dict(constant=-5.7, topology=4.7, limb=4.3, confidence=1.0, patch=-1.0)
+NOISE_PATCH = 9.0  # fitted: logarithm of the points of the largest patch in noise, over the root of the share in all
 LOW_CONFIDENCE_SHARE = 0.1  # fitted: of the vertices, whose confidence is at most the one that counts
 GOOD_SCORE = 0.7  # measured: 15 % of the right graphs of other shapes have less
 
@@ -107,11 +108,12 @@ class Reason:
         return self.text
 
 
-def graph_score(decisions: Iterable[Decision], confidence: np.ndarray) -> float:
+def graph_score(decisions: Iterable[Decision], confidence: np.ndarray, n_facing: int = 0, facing: float = 0.0) -> float:
     """The probability that a graph is right: components, loops and all ends. NaN without vertices.
 
-    A logistic model of three facts: how certain the least certain decision about loops, empty space and gaps is, from a
-    half to 1, and that about limbs; and the tenth percentile of the confidence (M,) of the vertices.
+    A logistic model of four facts: how certain the least certain decision about loops, empty space and gaps is, from a
+    half to 1, and that about limbs; the tenth percentile of the confidence (M,) of the vertices; and the logarithm of
+    `n_facing` of the report, as far as it is above that of the patches that noise makes of a share `facing`.
     """
     known = confidence[np.isfinite(confidence)]
     if len(known) == 0:
@@ -120,10 +122,17 @@ def graph_score(decisions: Iterable[Decision], confidence: np.ndarray) -> float:
     for decision in decisions:
         fact = "limb" if decision.about == "limb" else "topology"
         certainty[fact] = min(certainty[fact], decision.certainty)
-    return logistic(SCORE, dict(certainty, confidence=quantile(known, LOW_CONFIDENCE_SHARE)))
+    facts = dict(certainty, confidence=quantile(known, LOW_CONFIDENCE_SHARE))
+    return logistic(SCORE, facts | dict(patch=_patch(n_facing, facing)))
 
 
-def reasons_of_score(score: float, decisions: Iterable[Decision]) -> tuple[Reason, ...]:
+def _patch(n_facing: int, facing: float) -> float:
+    return max(float(np.log1p(n_facing) - NOISE_PATCH * np.sqrt(facing)), 0.0)
+
+
+def reasons_of_score(
+    score: float, decisions: Iterable[Decision], n_facing: int = 0, facing: float = 0.0
+) -> tuple[Reason, ...]:
     """Why a score makes a verdict doubtful: it is low or unknown. None where it is good."""
     if score >= GOOD_SCORE:
         return ()
@@ -134,6 +143,8 @@ def reasons_of_score(score: float, decisions: Iterable[Decision]) -> tuple[Reaso
     least = min(decisions, key=lambda decision: abs(decision.probability - 0.5), default=None)
     if least is not None:
         text, place = f"{text}; the least certain decision: {least}", least.place
+    if _patch(n_facing, facing):
+        text = f"{text}; {n_facing} points side by side face the curve, as where a hole was closed or a limb was lost"
     return (Reason("low score", text, place, dict(score=score)),)
 
 

@@ -1,10 +1,12 @@
 """Connector: contracted cloud -> graph (Cao et al. 2010, section 5)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
+from scipy.spatial import cKDTree
 
+from ..curve.medial import OrientedSurface
 from ..data.contraction import Contraction
 from ..data.skeleton import Skeleton
 from ..geometry.farthest_point import farthest_point_sampling
@@ -75,6 +77,14 @@ class Connector(Filter[Contraction, Skeleton]):
         "Join a point's vertex with those of all its foreign ring neighbours, or of the nearest.",
         choices=("all", "nearest"),
     )
+    shut: float = parameter(
+        0.01,
+        "Least share of a closed surface that faces the place to which it was contracted, as walls of narrow holes do "
+        "when these are shut, for the graph to be the curve on the medial axis of the solid instead, if that has "
+        "loops. 0 takes it always, 1 never.",
+        low=0,
+        high=1,
+    )
 
     def run(self, state: Contraction, context: RunContext) -> Skeleton:
         auto, diagonal = self.radius == "auto", state.frame.diagonal * state.frame.scale
@@ -84,24 +94,26 @@ class Connector(Filter[Contraction, Skeleton]):
         balls = np.maximum(radius, self.thickness * contraction_distance(state))
         samples, vertex_of_survivor = farthest_point_sampling(state.positions, balls)
         mass = group_sum(state.mass, vertex_of_survivor, len(samples))[:, None]
-        weighted = state.mass[:, None] * state.positions
-        vertices = state.frame.out_of(group_sum(weighted, vertex_of_survivor, len(samples)) / mass)
-        survivor = state.survivor_of_point
-        vertex_of_point = np.where(survivor >= 0, vertex_of_survivor[survivor], -1)
-        # copies, and what a sample stands for, count with one point
-        once = np.where(state.map.sampled, vertex_of_point, -1)
-        normals = np.full_like(state.points, np.nan)
-        normals[state.has_normal] = state.normals[state.map.row_of_point[state.has_normal]]
-        return Skeleton(
-            vertices=vertices,
-            edges=self._edges(state, vertex_of_survivor),
-            radii=plane_distance_radii(vertices, once, state.points, normals),
-            vertex_of_point=vertex_of_point,
-            points=state.points,
-            normals=normals,
-            report=state.report,
-            representative_of_point=state.surface_representatives,
-        )
+        vertices = group_sum(state.mass[:, None] * state.positions, vertex_of_survivor, len(samples)) / mass
+        vertex_of_row = vertex_of_survivor[state.map.survivor_of_row]
+        graph = raw_graph(state, vertices, self._edges(state, vertex_of_survivor), vertex_of_row)
+        return graph if self.shut == 1 else self._with_holes(state, graph, np.median(radius))
+
+    def _with_holes(self, state: Contraction, contracted: Skeleton, radius: float) -> Skeleton:
+        """The graph on the medial axis of the solid, if contraction has shut holes of it, or if no share is needed."""
+        surface = OrientedSurface.of(state)
+        if self.shut and not (surface.is_closed and surface.shut_for_certain >= self.shut):
+            return contracted
+        curve = surface.medial_graph()
+        if len(curve.places) == 0:
+            return contracted
+        balls = np.maximum(radius, self.thickness * curve.radii)
+        part, edges = curve.merged(farthest_point_sampling(curve.places, balls)[1])
+        vertices = group_sum(curve.places, part, part.max() + 1) / np.bincount(part)[:, None]
+        vertex_of_row = part[cKDTree(curve.places).query(state.cloud)[1]]
+        is_sound = curve.n_loops == curve.genus  # where tetrahedra cross the surface there are false loops
+        graph = raw_graph(state, vertices, edges, vertex_of_row, on_medial_axis=is_sound)
+        return graph if graph.n_loops or not self.shut else contracted
 
     def _edges(self, state: Contraction, vertex_of_survivor: np.ndarray) -> np.ndarray:
         rings = state.rings
@@ -121,3 +133,24 @@ def contraction_distance(state: Contraction) -> np.ndarray:
     distance = group_median(norm(state.cloud - state.positions[survivor]), survivor, len(state))
     _, neighbours = nearest_neighbours(state.positions, min(CONNECTOR.smoothing, len(state)))
     return row_medians(distance.take(neighbours))
+
+
+def raw_graph(
+    state: Contraction, vertices: np.ndarray, edges: np.ndarray, vertex_of_row: np.ndarray, on_medial_axis: bool = False
+) -> Skeleton:
+    """The skeleton with vertices (M, 3) in the working frame, to which the rows of the cloud belong."""
+    vertices, vertex_of_point = state.frame.out_of(vertices), state.map.to_points(vertex_of_row)
+    # copies, and what a sample stands for, count with one point
+    once = np.where(state.map.sampled, vertex_of_point, -1)
+    normals = np.full_like(state.points, np.nan)
+    normals[state.has_normal] = state.normals[state.map.row_of_point[state.has_normal]]
+    return Skeleton(
+        vertices=vertices,
+        edges=edges,
+        radii=plane_distance_radii(vertices, once, state.points, normals),
+        vertex_of_point=vertex_of_point,
+        points=state.points,
+        normals=normals,
+        report=replace(state.report, on_medial_axis=on_medial_axis),
+        representative_of_point=state.surface_representatives,
+    )

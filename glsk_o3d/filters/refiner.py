@@ -1,7 +1,7 @@
 """Refiner: raw graph -> one-dimensional, medial skeleton (Wen et al. 2024, section II-D)."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from ..curve.axis.fit import fit_axis, pull_back_detached
@@ -105,6 +105,11 @@ class Refiner(Filter[Skeleton, Skeleton]):
 
     def run(self, skeleton: Skeleton, context: RunContext) -> Skeleton:
         curve = Curve.of(skeleton)
+        if skeleton.report.on_medial_axis and self.handle < 1:  # the solid has answered
+            return replace(self, handle=0, air=0, bridge=0)._run(curve)
+        return self._run(curve)
+
+    def _run(self, curve: Curve) -> Skeleton:
         if not self.recentre:  # every point keeps its vertex
             return self._in_order(curve).to_skeleton()
         refined = on_points(self._in_order, curve, surface_sample(curve))
@@ -121,9 +126,13 @@ class Refiner(Filter[Skeleton, Skeleton]):
         if asks and _may_be_asked(curve):
             curve, surface, deferred = self._decided(curve, surface.oriented(curve))
         if self.recentre and len(curve.vertices):
-            curve = fit_axis(level_wide_ends(curve, surface), self.recentre + 1, surface, settle=True)
+            if not curve.report.on_medial_axis:
+                curve = fit_axis(level_wide_ends(curve, surface), self.recentre + 1, surface, settle=True)
             size = curve.binary_size  # fourth powers of lengths must not overflow
             curve = regrow_ends(move_junctions(curve.scaled(1 / size)), self.ends == "surface").scaled(size)
+            if _may_be_asked(curve):
+                n_facing, facing = surface.facing(curve)
+                curve = curve.with_facts(n_facing=n_facing, facing=facing)
         return measured(deferred.put_back(curve) if deferred else curve)
 
     def fitted(self, curve: Curve) -> tuple[Curve, Surface]:
@@ -185,7 +194,7 @@ class Refiner(Filter[Skeleton, Skeleton]):
     def _centred(self, curve: Curve, surface: Surface) -> Curve:
         if self.spacing:
             curve = subdivide_edges(curve, self.spacing)
-        return fit_axis(curve, self.recentre, surface)
+        return curve if curve.report.on_medial_axis else fit_axis(curve, self.recentre, surface)
 
 
 def _may_be_asked(curve: Curve) -> bool:

@@ -59,12 +59,6 @@ def inscribed_balls(points: np.ndarray, outward: np.ndarray) -> tuple[Floats, Fl
     return radius, contacts
 
 
-def medial_places(points: np.ndarray, normals: np.ndarray, rings: Rings) -> tuple[Floats, Floats]:
-    """A place on the medial axis for each point, (n, 3), and how far it is to be believed, (n,), from 0 to 1."""
-    outward = outward_normals(points, normals, rings)
-    return mean_places(points, outward, rings, *inscribed_balls(points, outward))
-
-
 def mean_places(
     points: np.ndarray, outward: np.ndarray, rings: Rings, radius: np.ndarray, contacts: np.ndarray
 ) -> tuple[Floats, Floats]:

@@ -13,7 +13,10 @@ EXTRA_OF = {
     **{"pymeshlab": "meshlab", "networkx": "graph"},
 }
 """The extra of this package that brings a module."""
-_NEEDED = {".html": "matplotlib", ".png": "matplotlib", ".las": "laspy", ".laz": "lazrs", ".e57": "pye57"}
+_NEEDED = {
+    **{".html": "matplotlib", ".png": "matplotlib", ".graphml": "networkx"},
+    **{".las": "laspy", ".laz": "lazrs", ".e57": "pye57"},
+}
 """The module that reads or writes files with an ending."""
 _OPEN3D_LIBRARIES = "libegl1 libgl1 libgomp1 libidn2-0 libudev1 libusb-1.0-0 libx11-6"
 """What Debian calls the shared libraries that Open3D loads."""

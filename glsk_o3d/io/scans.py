@@ -25,15 +25,14 @@ def _whole(read: Callable[[Path], Scan]) -> Reader:
     return lambda path, rows, bare: (None, map(read, [path]))  # not read before it is asked for
 
 
-def _opened_by_open3d(path: Path) -> Scan:
-    """The vertices of a mesh that Open3D reads, and its triangles."""
+def _mesh_of_open3d(path: str | os.PathLike[str]) -> Any:
     o3d = import_open3d()
     with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-        return Scan.of_mesh(o3d.io.read_triangle_mesh(str(path)))
+        return o3d.io.read_triangle_mesh(str(path))
 
 
 _SCAN_READERS: dict[str, Reader] = {
-    **dict.fromkeys(MESH_ENDINGS, _whole(_opened_by_open3d)),
+    **dict.fromkeys(MESH_ENDINGS, _whole(lambda path: Scan.of_mesh(_mesh_of_open3d(path)))),
     ".obj": _whole(lines.read_mesh),
     **dict.fromkeys(TEXT_ENDINGS, _whole(text_tables.read)),
     **dict.fromkeys((".las", ".laz"), scanners.blocks),
@@ -133,6 +132,12 @@ def read_mesh(path: str | os.PathLike[str]) -> Any:
     if not len(scan.triangles):
         raise FileFormatError(f"{path}: no triangles could be read: it is a cloud, or damaged")
     return scan.to_mesh()
+
+
+def read_textured_mesh(path: str | os.PathLike[str]) -> Any:
+    """Read a mesh as `read_mesh` does, or from OBJ and GLB with its texture, if it has one."""
+    mesh, textured = read_mesh(path), _mesh_of_open3d(path)
+    return textured if textured.has_triangle_uvs() else mesh
 
 
 def read_blocks(

@@ -33,6 +33,8 @@ FORMATS: dict[str, Format] = {
     ".npz": Format(fields.write_npz, fields.read_npz),
     ".swc": Format(trees.write_swc, trees.read_swc, trees=True),
     ".vtp": Format(lines.write_vtp),
+    ".dxf": Format(lines.write_dxf),
+    ".graphml": Format(lines.write_graphml),
     ".glb": Format(gltf.write, trees=True),
     ".urdf": Format(trees.write_urdf, trees=True),
 }
@@ -55,6 +57,8 @@ def save_skeleton(
     .obj         vertices, edges as ``l`` lines; no radii        MeshLab, Blender, CloudCompare
     .swc         trees, with radii                               neuron and plant tools
     .vtp         vertices, branches, radii, confidence           ParaView, Slicer, vmtk
+    .dxf         branches as polylines; no radii                 CAD
+    .graphml     vertices, edges, radii, confidence              Gephi, Cytoscape, yEd
     .glb         trees, as an armature with a skin of tubes      Blender
     .urdf        trees, as a robot of cylinders and balls        ROS, simulators
     ============ =============================================== =======================================
@@ -78,6 +82,8 @@ def save_skeleton(
         The ending is unknown, or the skeleton has loops or lacks data that the format needs.
     InvalidParameterError
         There is no such root.
+    MissingPackageError
+        GraphML needs networkx.
     OSError
         The folder does not exist, or the file cannot be written.
 

@@ -1,5 +1,6 @@
 """Approaches of a gripper beside walls, through handles, over planes, in noise and in gaps, with known answers."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from glsk_o3d import InvalidCloudError, InvalidParameterError, Skeleton, SkeletonWarning, samples
-from glsk_o3d.analysis import Gripper, grasp_candidates
+from glsk_o3d.analysis import Gripper, grasp_candidates, grasps
 
 HAND = Gripper(0.4, finger=(0.05, 0.06, 0.3), palm=(0.5, 0.1, 0.2), reach=0.05)
 CLEARANCE = 0.02
@@ -51,7 +52,7 @@ def test_a_wall_blocks_exactly_the_approaches_from_its_side(points, plane, why):
     assert beside.left_out == {why: 3 * free.places}
     kept = free.approach[:, 1] > -1e-9
     check_same(replace(free[kept], left_out=beside.left_out), beside)
-    np.testing.assert_allclose(beside.opening, 0.2 + CLEARANCE)
+    np.testing.assert_allclose(beside.opening, 0.2 + 3 * CLEARANCE)
     assert (beside.seen == 3).all()
 
 
@@ -123,7 +124,7 @@ def test_no_finger_slips_between_the_points_of_a_sparse_thin_wall(seed):
 def test_the_jaws_close_on_something_and_no_sparse_part_is_made_thicker():
     sparse = grasp(rod(n=150))
     assert len(sparse) == 8 * sparse.places
-    np.testing.assert_allclose(sparse.opening, 0.2 + CLEARANCE)
+    np.testing.assert_allclose(sparse.opening, 0.2 + 3 * CLEARANCE)
     with pytest.warns(SkeletonWarning, match="72 ways in with nothing between the jaws"):
         assert len(grasp(rod(), cloud=rod().points + [0, 0, 30])) == 0
 
@@ -156,13 +157,19 @@ def test_the_best_of_each_place_comes_before_the_second_best_of_any():
             assert (np.diff(grasps.quality[group == number].round(9)) <= 0).all()
 
 
-def test_jaws_open_wider_where_points_scatter():
+@pytest.mark.parametrize(("room", "times"), [(3, 3), (2.5, 2), (2, 2), (1, 1)])
+def test_jaws_open_by_three_clearances_or_as_wide_as_is_free(room, times):
+    """Between two walls, each as far from the rod as a finger is thick and as so many halves of the clearance."""
+    walls = [sheet((-1, 1), side * (0.1 + 0.05 + (room + 1) * CLEARANCE / 2 + 1e-3), (-0.2, 0.2)) for side in (-1, 1)]
+    between = grasp(rod(np.concatenate(walls)), around=1)
+    np.testing.assert_allclose(between.opening, 0.2 + times * CLEARANCE)
+    assert len(between) == between.places
+
+
+def test_jaws_open_wide_enough_where_points_scatter():
     noisy = rod()
     noisy = replace(noisy, points=noisy.points + np.random.default_rng(0).normal(scale=0.006, size=noisy.points.shape))
-    grasps = grasp(noisy)
-    times = ((grasps.opening - 0.2) / CLEARANCE).round(6)
-    assert len(grasps) == 72
-    assert {2} < set(times) <= {1, 2, 3}
+    assert len(grasp(noisy)) == 72
 
 
 def test_fingers_reach_as_far_as_the_part_and_no_farther_than_they_can():
@@ -239,7 +246,7 @@ def test_the_jaws_close_across_the_thin_side():
     best = grasp(skeleton)
     best = best[: best.places]
     np.testing.assert_allclose(abs(best.closing @ turn.apply([0, 0, 1])), 1, atol=0.02)
-    np.testing.assert_allclose(best.opening, 0.08 + CLEARANCE, atol=0.03)  # turned by 6 degrees
+    np.testing.assert_allclose(best.opening, 0.08 + 3 * CLEARANCE, atol=0.03)  # turned by 6 degrees
     np.testing.assert_allclose(best.contact, 1, atol=0.05)
 
 
@@ -247,7 +254,7 @@ def test_an_unseen_side_is_as_far_as_the_other_and_the_middle_is_between_the_jaw
     half, _ = bar(turn=0.0, seen=lambda points: points[:, 2] > 0)
     best = grasp(half, around=4)
     across = abs(best.closing[:, 2]) > 0.99
-    np.testing.assert_allclose(best.opening[across], 0.08 + CLEARANCE, atol=0.01)
+    np.testing.assert_allclose(best.opening[across], 0.08 + 3 * CLEARANCE, atol=0.01)
     assert best.seen[across].max() == 2
     whole, _ = bar(turn=0.0)
     lowered = grasp(replace(whole, vertices=whole.vertices - [0, 0, 0.01]), around=4)  # an axis beside the middle
@@ -268,8 +275,28 @@ def test_a_budget_takes_the_best_places_first():
     assert some.left_out["places beyond the budget"] == everything.places - 3
     assert len(np.unique(some.branch * 1e3 + some.position[:, 0].round(2))) == 3
     assert some.quality.max() >= everything.quality.max() - 0.02
-    assert len(grasp(skeleton, spacing=0.001, seconds=0)) > 0  # at least one round
-    assert "places beyond the budget" in grasp(skeleton, spacing=0.001, seconds=0).left_out
+
+
+@pytest.mark.parametrize(("seconds", "searched"), [(0, 1), (0.02, 1), (1.5, 2), (3.5, 4), (1e6, 22)])
+def test_seconds_are_over_after_at_most_one_more_place(monkeypatch, seconds, searched):
+    """With a clock that goes on by a second in each search, and by a thousandth whenever it is read."""
+    clock, check = [0.0], grasps.check_approaches
+
+    def read():
+        clock[0] += 0.001
+        return clock[0]
+
+    def search(*words):
+        clock[0] += 1
+        return check(*words)
+
+    monkeypatch.setattr(time, "monotonic", read)
+    monkeypatch.setattr(grasps, "check_approaches", search)
+    skeleton, _ = bar()
+    found = grasp(skeleton, spacing=0.05, seconds=seconds)
+    assert found.places - found.left_out.get("places beyond the budget", 0) == searched
+    assert clock[0] < seconds + 1.01
+    check_same(found, grasp(skeleton, spacing=0.05, max_places=searched)) if seconds >= 1 else None
 
 
 def test_the_scene_is_an_obstacle_and_the_mask_says_what_the_object_is():

@@ -42,7 +42,7 @@ def test_a_straight_tube():
     assert (len(grasps), grasps.places, grasps.left_out) == (54, 9, {})
     along = np.tile(np.linspace(-0.4, 0.4, 9)[:, None] * [1, 0, 0], (6, 1))  # each place once, six times over
     np.testing.assert_allclose(grasps.position, along, atol=1e-12)
-    np.testing.assert_allclose(grasps.opening, 0.23)
+    np.testing.assert_allclose(grasps.opening, 0.29)
     np.testing.assert_allclose(grasps.quality, 1 - 0.2 / 0.5)
     np.testing.assert_allclose(grasps.axis, np.tile([1, 0, 0], (54, 1)), atol=1e-12)
     np.testing.assert_allclose(grasps.approach[0], [0, 0, -1], atol=1e-12)  # from above
@@ -64,7 +64,7 @@ def test_a_cone_is_wider_across_than_the_ball_in_it():
     grasps = grasp_candidates(cone(0.1, 0.25), 1.0, clearance=0.01, spacing=0.1)
     slope, radius = 0.15, 0.1 + 0.15 * grasps.position[:, 0]
     width = 2 * radius / np.sqrt(1 - slope**2)
-    np.testing.assert_allclose(grasps.opening, width + 0.01)
+    np.testing.assert_allclose(grasps.opening, width + 0.03)
     np.testing.assert_allclose(grasps.quality, (1 - width) * np.sqrt(1 - slope**2))
     assert (np.diff(grasps.position[: grasps.places, 0]) > 0).all()  # the thin end is best
 
@@ -73,7 +73,7 @@ def test_a_torus():
     skeleton = axis_of(samples.torus(10, ring_radius=0.4, radius=0.1))
     grasps = grasp_candidates(skeleton, 0.5, clearance=0.05, around=4)
     assert grasps.places == round(2 * np.pi * 0.4 / 0.1) == 25
-    np.testing.assert_allclose(grasps.opening, 0.25)
+    np.testing.assert_allclose(grasps.opening, 0.35)
     position, out = grasps.position[:25], grasps.position / np.linalg.norm(grasps.position, axis=1, keepdims=True)
     gap = np.linalg.norm(position - np.roll(position, 1, axis=0), axis=1)
     np.testing.assert_allclose(gap, 2 * 0.4 * np.sin(np.pi / 25), rtol=2e-3)

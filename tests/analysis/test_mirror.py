@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from glsk_o3d import Skeleton, samples
 from glsk_o3d.analysis.limb_names import bone_names
-from glsk_o3d.analysis.mirror import mirror_plane, mirrored_branches
+from glsk_o3d.analysis.mirror import Plane, mirror_plane, mirrored_branches
 from glsk_o3d.analysis.rigging import armature
 from glsk_o3d.io.formats.graphs import as_forest
 
@@ -30,9 +30,9 @@ def limbs(name):
     return limbs
 
 
-def body(name, noise=0.0):
+def body(name, noise=0.0, more=()):
     """A tree of limbs, rooted in the trunk, with a cloud around its curve."""
-    curves = [np.array(limb, float) for limb in limbs(name)]
+    curves = [np.array(limb, float) for limb in (*limbs(name), *more)]
     pieces = [np.linspace(*ends, 5) for curve in curves for ends in itertools.pairwise(curve)]
     vertices, inverse = np.unique(np.concatenate(pieces).round(9), axis=0, return_inverse=True)
     edges = [pair for piece in inverse.reshape(-1, 5) for pair in itertools.pairwise(piece)]
@@ -68,7 +68,7 @@ def test_joints_of_a_symmetric_rig_are_mirror_images(name, joints):
     np.testing.assert_array_equal(partner[partner], np.arange(len(partner)))
     assert (partner != np.arange(len(partner))).sum() > 12
     assert (mirrored_branches(bones, plane) >= 0).all()
-    assert joints is None or len(bones.vertices) in (joints - 1, joints)
+    assert joints is None or len(bones.edges) in (joints - 1, joints)
     sides = [bone.rpartition("_")[2] for bone in bone_names(bones, plane, sides=True)]
     assert sides.count("left") == sides.count("right") > 5
     assert cKDTree(forest.vertices).query(bones.vertices)[0].max() < 0.12
@@ -101,6 +101,35 @@ def test_limbs_have_names(name, up):
         side = middle(f"{kind}_left") - middle(f"{kind}_right")
         assert side[second] > 0.2
         assert abs(side[first]) < 0.1
+
+
+def prongs(end, back, n, length):
+    """So many curves from the end of a limb, spread over the half circle ahead of it; one is shorter by a third."""
+    ahead = np.subtract(end, back) / np.linalg.norm(np.subtract(end, back))
+    aside = np.array([0, 1.0, 0]) if abs(ahead[1]) < 0.9 else np.array([1.0, 0, 0])
+    aside = aside - aside @ ahead * ahead
+    for k, turn in enumerate(np.linspace(-0.9, 0.9, n)):
+        way = np.cos(turn) * ahead + np.sin(turn) * aside / np.linalg.norm(aside)
+        yield [end, end + length * (2 / 3 if k == 0 else 1) * way]
+
+
+@pytest.mark.parametrize("joints", [None, 55])
+@pytest.mark.parametrize("toes", [0, 3])
+@pytest.mark.parametrize("fingers", [(2, 2), (3, 3), (4, 4), (5, 5), (5, 2), (0, 4)])
+def test_fingers_and_toes_belong_to_their_limb(fingers, toes, joints):
+    curves, more = limbs("person"), []
+    for side, n in zip((3, 5), fingers, strict=True):
+        more += prongs(curves[side][-1], curves[side][-2], n, 0.12)
+        more += prongs(curves[side - 1][-1], curves[side - 1][-2], toes, 0.06)
+    forest = body("person", more=more)
+    bones = armature(forest, joints)
+    names = bone_names(bones, Plane(np.zeros(3), np.array([1.0, 0, 0])))
+    assert {"head", "arm", "leg"} <= {each.split(".")[0] for each in names} <= {"head", "neck", "spine", "arm", "leg"}
+    assert len(set(names)) == len(names)
+    x, z = bones.vertices[bones.edges[:, 1]][:, [0, 2]].T
+    for where, part, side in ((x > 0.5, "arm", "left"), (x < -0.5, "arm", "right")):
+        assert {(name[:4], name.partition("_")[2]) for name in np.array(names)[where]} == {(f"{part}.", side)}
+    assert all(name.startswith("leg.") for name in np.array(names)[z < 0.8])
 
 
 def test_what_is_no_body_has_numbers():

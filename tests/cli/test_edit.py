@@ -111,6 +111,23 @@ def test_a_mesh_or_a_cloud_hangs_on_the_bones(invoke, tmp_path, y, ending):
     assert "outside of the cloud" in invoke("rig", y, file, "-o", "far.glb", "--root", "9,9,9").output
 
 
+@pytest.mark.parametrize("ending", ["obj", "glb"])
+def test_the_texture_of_a_mesh_goes_into_its_rig(invoke, tmp_path, y, ending):
+    trimesh, images = pytest.importorskip("trimesh"), pytest.importorskip("PIL.Image")
+    pixels = np.random.default_rng(1).integers(0, 256, (4, 4, 3), np.uint8)
+    box = o3d.geometry.TriangleMesh.create_box(create_uv_map=True).translate([-0.5, -0.5, -0.5])
+    corners, uv = np.asarray(box.vertices)[np.asarray(box.triangles)].reshape(-1, 3), np.asarray(box.triangle_uvs)
+    look = trimesh.visual.TextureVisuals(uv=uv, image=images.fromarray(pixels))
+    mesh = trimesh.Trimesh(corners, np.arange(36).reshape(-1, 3), process=False, visual=look)
+    mesh.export(tmp_path / f"box.{ending}")
+    assert invoke("rig", y, f"box.{ending}", "-o", "r.glb").exit_code == 0
+    (rigged,) = trimesh.load(tmp_path / "r.glb").geometry.values()
+    np.testing.assert_array_equal(rigged.visual.material.baseColorTexture.convert("RGB"), pixels)
+    known = np.column_stack([corners, uv])
+    written = np.column_stack([rigged.vertices, rigged.visual.uv])
+    assert {*map(tuple, written.round(5) + 0)} == {*map(tuple, known.round(5) + 0)}
+
+
 def test_a_rig_alone_has_its_tubes_and_loops_are_cut_if_one_says_so(invoke, ring_file, tmp_path):
     assert invoke("rig", ring_file, "-o", "r.glb", "--cut-loops").exit_code == 0
     save_rig(read_skeleton(tmp_path / ring_file), tmp_path / "expected.glb", cut_loops=True)

@@ -9,6 +9,8 @@ import pytest
 from glsk_o3d import Skeleton, read_skeleton, samples, save_skeleton
 from glsk_o3d.analysis import Gripper, grasp_candidates
 
+BEYOND = "places beyond the budget"
+
 
 @pytest.fixture
 def rod(tmp_path):
@@ -51,3 +53,31 @@ def test_the_points_come_from_a_file(invoke, tmp_path, rod, write_scan):
     assert facts["found"] == len(facts["grasps"]) > 9
     assert min(row["approach"][1] for row in facts["grasps"]) > -1e-9
     assert {row["confidence"] for row in facts["grasps"]} == {None}
+
+
+def test_the_budget_and_the_verdict_are_those_of_python(invoke, tmp_path, rod):
+    skeleton = read_skeleton(tmp_path / rod)
+    words = ("grasps", rod, "--opening", 0.4, "--json")
+    few = json.loads(invoke(*words, "--max-places", 3).stdout)
+    assert (few["found"], few["left_out"]) == (len(grasp_candidates(skeleton, 0.4, max_places=3)), {BEYOND: 7})
+    first = json.loads(invoke(*words, "--seconds", 0).stdout)
+    assert (first["found"], first["left_out"]) == (12, {BEYOND: 9})
+    assert json.loads(invoke(*words, "--seconds", 1e3).stdout)["found"] == 120
+
+    flat = skeleton.with_report(skeleton.report.with_reason("sheet", "this is a sheet"))
+    save_skeleton(flat, tmp_path / rod)
+    refused = invoke(*words)
+    assert json.loads(refused.stdout)["found"] == 0
+    assert "this is a sheet" in refused.stderr
+    assert "accept" in refused.stderr
+    assert json.loads(invoke(*words, "--accept", "no curve skeleton").stdout)["found"] == 120
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [(("--accept", "any"), "must be one of"), (("--max-places", 0), "max-places"), (("--seconds", -1), "seconds")],
+)
+def test_wrong_budgets_and_verdicts_are_refused(invoke, rod, words, why):
+    result = invoke("grasps", rod, "--opening", 0.4, *words)
+    assert result.exit_code == 2
+    assert why in result.stderr

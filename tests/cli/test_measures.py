@@ -43,7 +43,8 @@ def test_tree_lines_file_and_json_agree(invoke, tmp_path, y):
         rows = list(csv.DictReader(stream))
     assert [int(row["parent"]) for row in rows] == table.parent.tolist()
     np.testing.assert_allclose([float(row["volume"]) for row in rows], table.volume)
-    facts = json.loads(invoke("tree", y, "--json", "--root", "0,0,-0.5").stdout)
+    assert reported["reasons"].startswith("unknown score")
+    (facts,) = json.loads(invoke("tree", y, "--json", "--root", "0,0,-0.5").stdout)["trees"]
     assert (facts["volume"], facts["stem_diameter"]) == (list(measures.volume), None)  # it is not so high
     assert (facts["unit"], facts["up"]) == (1, "z")
     assert invoke("tree", y, "-q").stdout == ""
@@ -51,13 +52,15 @@ def test_tree_lines_file_and_json_agree(invoke, tmp_path, y):
 
 def test_units_what_is_up_and_cylinders_in_the_units_of_the_file(invoke, tmp_path, y):
     metres, turned = (
-        json.loads(invoke("tree", y, "--json", "--root", "z", "--up", up).stdout)["height"] for up in ("z", "-z")
+        json.loads(invoke("tree", y, "--json", "--root", "z", "--up", up).stdout)["trees"][0]["height"]
+        for up in ("z", "-z")
     )
     assert turned != metres
     facts = json.loads(invoke("tree", y, "--cylinders", "c.csv", "--unit", "0.001", "--root", "z", "--json").stdout)
-    assert (facts["height"], facts["files"]) == (pytest.approx(0.001 * metres), ["c.csv"])
-    tall = invoke("tree", y, "--unit", "1000", "--up", "z", "--root", "z").stderr
-    assert "is a unit of the cloud 1000 m? give its metres" in tall
+    assert (facts["trees"][0]["height"], facts["files"]) == (pytest.approx(0.001 * metres), ["c.csv"])
+    tall = invoke("tree", y, "--unit", "1000", "--up", "z", "--root", "z")
+    assert "is a unit of the cloud 1000 m? give its metres" in tall.stdout
+    assert tall.stderr == ""
     cylinders(read_skeleton(tmp_path / y), "z").to_csv(tmp_path / "expected.csv")
     assert (tmp_path / "c.csv").read_bytes() == (tmp_path / "expected.csv").read_bytes()
 
@@ -85,6 +88,11 @@ def test_a_table_of_trees_has_a_row_for_each_and_the_errors(invoke, tmp_path, y,
     page = (tmp_path / "tree.html").read_text("utf-8")
     for label in ("length with traced", "volume without traced", "Taper", "Diameter classes"):
         assert label in page
-    facts = json.loads(invoke("tree", "scan.ply", "--json").stdout)
+    (facts,) = json.loads(invoke("tree", "scan.ply", "--json").stdout)["trees"]
+    several = json.loads(invoke("tree", "scan.ply", "bad.json", "--json").stdout)["trees"]
+    assert several[0] == facts
+    assert several[1].keys() == {"tree", "error"}
+    doubtful = invoke("tree", y, y, "--unit", "1000", "--root", "z").stdout
+    assert doubtful.count(f"{y}: the tree is") == 2
     assert len(facts["taper"]) == len(measures.taper)
     assert {"low", "high", "volume_with_traced"} <= facts["classes"][0].keys()

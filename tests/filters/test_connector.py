@@ -1,12 +1,24 @@
 """Connector: contracted cloud -> graph, as far as the outside can see."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 from scipy.spatial.distance import cdist
 
-from glsk_o3d import Connector, Contractor, LPRReducer, RingBuilder, Sampler, Skeleton, pipelines, samples
+from glsk_o3d import (
+    Connector,
+    Contractor,
+    LPRReducer,
+    Refiner,
+    RingBuilder,
+    Sampler,
+    Skeleton,
+    pipelines,
+    samples,
+    skeletonize,
+)
 
 VARIANTS = {
     name: next(stage for stage in make().stages if isinstance(stage, Connector))
@@ -79,3 +91,69 @@ def test_points_with_a_ring_and_noisy_points_show_the_surface():
     np.testing.assert_array_equal(shown, np.union1d(noisy_rings.map.point_of_survivor, spoilt))
     assert (shown < 6000).sum() < 4000 < 6000
     assert np.isin(shown, Connector()(state).supporting_points).all()
+
+
+def plate(hole, high, holes=3, n=4096, seed=0, noise=0.0):
+    """A plate with square holes in a row, `hole` wide, and bars one wide around them, turned at random."""
+    rng = np.random.default_rng(seed)
+    length, width = holes * hole + holes + 1, hole + 2
+    starts = 1 + (hole + 1) * np.arange(holes)
+    walls = [(0, 0, length, width), *((start, 1, start + hole, 1 + hole) for start in starts)]
+    sides = np.array([((a, b), (c, b)) for a, b, c, d in walls] + [((a, d), (c, d)) for a, b, c, d in walls])
+    more = [((a, b), (a, d)) for a, b, c, d in walls] + [((c, b), (c, d)) for a, b, c, d in walls]
+    sides = np.concatenate([sides, more]).astype(float)
+    lengths = np.linalg.norm(sides[:, 1] - sides[:, 0], axis=1)
+    wall, face = lengths.sum() * high, 2 * (length * width - holes * hole**2)
+    on_wall = rng.random(2 * n) < wall / (wall + face)
+    side = rng.choice(len(sides), 2 * n, p=lengths / lengths.sum())
+    on_walls = sides[side, 0] + rng.random((2 * n, 1)) * (sides[side, 1] - sides[side, 0])
+    x = np.where(on_wall[:, None], on_walls, rng.random((2 * n, 2)) * [length, width])
+    z = np.where(on_wall, rng.random(2 * n), rng.integers(0, 2, 2 * n)) * high
+    in_hole = ((x[:, :1] > starts) & (x[:, :1] < starts + hole)).any(axis=1) & (np.abs(x[:, 1] - width / 2) < hole / 2)
+    points = np.column_stack([x, z])[on_wall | ~in_hole][:n]
+    return points @ np.linalg.qr(rng.normal(size=(3, 3)))[0] + noise * rng.standard_normal((n, 3))
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:uncertain topology", "ignore:sphere-like")  # of those that stay shut
+@pytest.mark.parametrize("noise", [0.0, 0.03])
+def test_narrow_holes_of_a_plate_stay_open(noise):
+    """Those a third to nine tenths as wide as the bars, of plates as thick as the bars are wide and of thinner ones."""
+    right = []
+    for hole, high, holes, seed in product((0.35, 0.6, 0.9), (0.6, 1.0), (1, 2, 3), (0, 1)):
+        if noise and hole < 0.5:
+            continue
+        found = skeletonize(plate(hole, high, holes, seed=seed, noise=noise))
+        right.append((found.n_components, found.n_loops, len(found.leaves)) == (1, holes, 0))
+    assert np.mean(right) >= (0.94 if noise == 0 else 0.9)
+
+
+def test_where_contraction_shuts_a_hole_the_graph_is_on_the_medial_axis(assert_sound):
+    points = plate(0.5, 1.0)
+    state = (pipelines.rings() | Contractor())(points)
+    shut, opened = Connector(shut=1)(state), Connector()(state)
+    assert opened.n_loops == 3
+    assert (opened.report.on_medial_axis, shut.report.on_medial_axis) == (True, False)
+    assert_sound(opened, len(points), triangles=True)
+    refined = Refiner()(opened)
+    assert refined.n_loops == 3 > Refiner()(shut).n_loops
+    assert {decision.about for decision in refined.report.decisions} <= {"limb"}  # the solid answers the others
+    assert Refiner(handle=1)(opened).n_loops == 0
+
+
+def test_tubes_and_scans_are_not_asked_for_their_solid():
+    for points in (samples.torus(2000).points, samples.sauropod(3000).points, samples.sheet(1500).points):
+        state = (pipelines.rings() | Contractor())(points)
+        contracted, either = Connector(shut=1)(state), Connector()(state)
+        assert not either.report.on_medial_axis
+        np.testing.assert_array_equal(contracted.vertices, either.vertices)
+        np.testing.assert_array_equal(contracted.edges, either.edges)
+
+
+def test_the_medial_axis_can_be_had_of_any_solid(assert_sound):
+    points = samples.torus(2000).points
+    ring = Connector(shut=0)((pipelines.rings() | Contractor())(points))
+    assert ring.report.on_medial_axis
+    assert_sound(ring, len(points), triangles=True)
+    assert ring.n_loops == 1
+    np.testing.assert_allclose(np.linalg.norm(ring.vertices[:, :2], axis=1), 0.4, atol=0.02)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from glsk_o3d import pipelines, samples
-from glsk_o3d.geometry.inscribed_balls import inscribed_balls, medial_places, outward_normals
+from glsk_o3d.geometry.inscribed_balls import inscribed_balls, mean_places, outward_normals
 
 
 def on_capsule(n, seed=0):
@@ -41,7 +41,7 @@ def test_normals_point_outward_and_places_are_inside(name, noise):
     rng, at = np.random.default_rng(1), state.positions
     normals = state.normals[state.survivors] * rng.choice([-1, 1], (len(state), 1))
     out = outward_normals(at, normals, state.rings)
-    places, trust = medial_places(at, normals, state.rings)
+    places, trust = mean_places(at, out, state.rings, *inscribed_balls(at, out))
 
     def depth(moved):
         return -samples.signed_distance(state.frame.out_of(moved), sample.nodes, sample.edges, sample.radii)

@@ -20,7 +20,7 @@ from glsk_o3d.samples import y_junction
 points = y_junction(600).points
 skeleton = glsk.skeletonize(points)
 from glsk_o3d.io.skeletons import FORMATS, READABLE
-for ending in FORMATS:
+for ending in FORMATS.keys() - {".graphml"}:
     glsk.save_skeleton(skeleton, f"s{ending}", cut_loops=True)
     if ending in READABLE:
         glsk.read_skeleton(f"s{ending}")
@@ -41,6 +41,7 @@ requests = {
     "preview": lambda: glsk.save_preview(skeleton, "s.png"),
     "report": lambda: glsk.save_report(skeleton, "s.html"),
     "graph": skeleton.to_networkx,
+    "graphml": lambda: glsk.save_skeleton(skeleton, "s.graphml"),
     "plot": lambda: glsk.plot_skeleton(skeleton),
     "colours": lambda: glsk.to_line_set(skeleton, "branch"),
     "crosscheck": lambda: cross_check(points),
@@ -60,7 +61,7 @@ print(json.dumps(messages))
 """
 NAMED = {
     **dict.fromkeys(("preview", "report", "plot", "colours", "batch"), "pictures"),
-    **{"las": "las", "laz": "las", "e57": "e57"},
+    **{"las": "las", "laz": "las", "e57": "e57", "graphml": "graph"},
     **{name: name for name in ("graph", "crosscheck", "meshlab")},
 }
 

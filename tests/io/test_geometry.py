@@ -1,11 +1,11 @@
-"""Skeletons as line sets, in colours, and as tubes: closed, outward, as thick as they should be."""
+"""Skeletons as line sets, in colours, as tubes: closed, outward, as thick as they should be; and as voxels."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from glsk_o3d import InvalidParameterError, Skeleton, samples, to_line_set, to_tubes
+from glsk_o3d import InvalidParameterError, Skeleton, samples, to_line_set, to_tubes, to_voxels
 from glsk_o3d.analysis import branch_table
 from glsk_o3d.io.colors import COLOR_NAMES, UNKNOWN_GREY, shades
 from glsk_o3d.io.geometry import sweep
@@ -146,3 +146,32 @@ def test_radius_and_refusals():
     for wrong in (dict(radius=0), dict(radius=np.nan), dict(sides=2), dict(sides=8.0), dict(color="red", radius=1)):
         with pytest.raises(InvalidParameterError, match=next(iter(wrong))):
             to_tubes(bare, **wrong)
+
+
+# -------------------------------------------------------------------------------------------------------------- voxels
+
+
+@pytest.mark.parametrize("place", [0.0, 1e5])
+def test_voxels_fill_a_tube_with_round_ends(place):
+    tube = graph(np.array([[0, 0, 0], [2, 0, 0]]) + place, [(0, 1)], [0.5, 0.5])
+    grid = to_voxels(tube, 0.05)
+    index = np.array([voxel.grid_index for voxel in grid.get_voxels()])
+    assert len(index) * 0.05**3 == pytest.approx(np.pi * 0.25 * (2 + 2 / 3), rel=0.01)
+    assert (index.min(axis=0).tolist(), index.max(axis=0).tolist()) == ([0, 0, 0], [59, 19, 19])
+    np.testing.assert_allclose(grid.origin, np.array([-0.5, -0.5, -0.5]) + place)
+    asked = np.array([[1, 0.48, 0], [1, 0.52, 0], [-0.48, 0, 0], [-0.45, 0.45, 0]]) + place
+    inside = grid.check_if_included(to_line_set(graph(asked, (), np.ones(4)), (0, 0, 0)).points)
+    assert inside == [True, False, True, False]
+
+
+def test_what_has_no_voxels():
+    ball = graph([[0, 0, 0]], (), [1.0])
+    assert len(to_voxels(ball, 0.1).get_voxels()) * 0.1**3 == pytest.approx(4 / 3 * np.pi, rel=0.02)
+    for wrong, size, cause in (
+        (ball, 0, "size = 0"),
+        (ball, 1e-3, r"8e\+09 voxels"),
+        (graph([[0, 0, 0]], (), [np.nan]), 0.1, "lacks some"),
+        (graph((), (), ()), 0.1, "empty"),
+    ):
+        with pytest.raises(InvalidParameterError, match=cause):
+            to_voxels(wrong, size)

@@ -100,6 +100,16 @@ def test_with_an_opening_poses_are_grasps_above_a_table(ros, cloud, expected, ro
     assert "too wide" in warning
 
 
+@pytest.mark.parametrize("budget", [dict(max_places=2), dict(seconds=1e-9), dict(max_places=3, seconds=1e6)])
+def test_grasps_have_a_budget(ros, cloud, expected, rows, budget):
+    node = ros.node(opening=0.6, **budget)
+    node.on_cloud(cloud)
+    grasps = grasp_candidates(expected, 0.6, **budget)
+    assert 0 < len(grasps) < len(grasp_candidates(expected, 0.6))
+    assert grasps.left_out["places beyond the budget"] == grasps.places - budget.get("max_places", 1)
+    np.testing.assert_array_equal(rows(pose.position for pose in node.published[1][1].poses), grasps.position)
+
+
 def test_a_crop_is_what_is_worked_on(ros, cloud, points):
     low, high = points.min(axis=0), points.max(axis=0)
     high[0] = low[0] + 0.6 * (high[0] - low[0])
@@ -265,6 +275,8 @@ def test_a_bad_cloud_is_one_warning_and_the_next_is_served(ros, cloud, header, m
         (dict(cluster=-1.0), "cluster = -1"),
         (dict(plane_distance=float("inf")), "plane_distance = inf"),
         (dict(max_points=-1), "max_points = -1"),
+        (dict(max_places=-1), "max_places = -1"),
+        (dict(seconds=-1.0), "seconds = -1"),
     ],
 )
 def test_wrong_parameters_end_the_node_at_once(ros, parameters, message):

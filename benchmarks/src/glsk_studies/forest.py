@@ -126,6 +126,42 @@ def scan(seed: int) -> tuple[samples.Sample, np.ndarray, int]:
     return tree, np.concatenate(found), scanners
 
 
+def leafy(seed: int) -> tuple[np.ndarray, float]:
+    """A tree of 4 to 14 m, of every second seed with leaves, and the share of the points that these have.
+
+    Leaves are discs of 1 to 5 cm, at most 5 to 25 cm from limbs of the thinner half. Their surface is 0.1 to 6 times
+    that of the wood, and as dense in points, of which there are 500 to 5000 per square metre with 0.5 to 4 mm of noise.
+    Three scanners see the wood of every third tree.
+    """
+    rng = np.random.default_rng([seed, 8])
+    height = rng.uniform(4, 14)
+    shape = dict(
+        forks=int(rng.integers(3, 7)), length=height / 2.45, radius=height * rng.uniform(0.008, 0.02), seed=seed
+    )
+    outline = samples.tree(1, **shape)
+    ends, radii = outline.nodes[outline.edges], outline.radii[outline.edges]
+    length = norm(ends[:, 1] - ends[:, 0])
+    area = np.pi * (radii.sum(axis=1) * length).sum()
+    density = min(500 * 10 ** rng.random(), 25_000 / area)
+    cameras = None if seed % 3 else CAMERAS
+    points = samples.tree(int(density * area), cameras=cameras, **shape).points
+    more, size, reach = 0.1 * 60 ** rng.random(), rng.uniform(0.01, 0.05), rng.uniform(0.05, 0.25)
+    found = [points]
+    if seed % 2:
+        thin = np.flatnonzero(radii.mean(axis=1) < np.median(radii))
+        limb = rng.choice(thin, int(more * area / (np.pi * size**2)), p=length[thin] / length[thin].sum())
+        far = radii[limb].max(axis=1) + size + reach * rng.random(len(limb))
+        middle = ends[limb, 0] + rng.random((len(limb), 1)) * (ends[limb, 1] - ends[limb, 0])
+        middle += far[:, None] * unit(rng.normal(size=middle.shape))
+        axes = np.linalg.qr(rng.normal(size=(len(limb), 3, 3)))[0][:, :2]
+        leaf = rng.integers(len(limb), size=int(min(density * more * area, 40_000)))
+        turn, out = rng.uniform(0, 2 * np.pi, len(leaf)), size * np.sqrt(rng.random(len(leaf)))
+        on_leaf = out[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
+        found.append(middle[leaf] + (on_leaf[:, :, None] * axes[leaf]).sum(axis=1))
+    cloud = np.concatenate(found)
+    return cloud + rng.uniform(0.0005, 0.004) * rng.normal(size=cloud.shape), 1 - len(points) / len(cloud)
+
+
 def volume(tree: samples.Sample, n: int = 4_000_000) -> float:
     """Of the union of its tapered capsules: of each the part that is inside no earlier one, by points in its box.
 
@@ -286,6 +322,26 @@ def measure_stem(seed: int) -> dict[str, float]:
         volume=sum(found.volume),
         true_volume=volume(tree) - 2 / 3 * np.pi * float(tree.radii[0]) ** 3,
     )
+
+
+def measure_leaves(seed: int) -> dict:
+    """What the doubts of a tree with leaves, or without, ask for."""
+    cloud, share = leafy(seed)
+    asked = [
+        word for word in ("leaf-off", "more points") if word in " ".join(tree_measures(pipelines.tree()(cloud)).doubts)
+    ]
+    return dict(leaves=share, asked=" or ".join(asked) or "nothing")
+
+
+def leaf_tables(rows: list[dict]) -> Tables:
+    """How many trees without and with leaves are asked for what."""
+    answers = ("nothing", "more points", "leaf-off or more points", "leaf-off")
+    kinds = {"bare": (0, 0), "leaves have up to 30 % of the points": (1e-9, 0.3), "leaves have more": (0.3, 1)}
+    lines = []
+    for kind, (low, high) in kinds.items():
+        here = [row["asked"] for row in good(rows) if low <= row["leaves"] <= high]
+        lines.append([kind, f"{len(here)}", *(f"{here.count(answer)}" for answer in answers)])
+    return [("What is asked for, of trees with leaves and without", ["", "trees", *answers], lines)]
 
 
 def diameter_at(tree: samples.Sample, height: float) -> float:

@@ -65,6 +65,13 @@ def stems(trees: Trees = 36, jobs: Jobs = 2, output: Output = None, page: Page =
 
 
 @app.command()
+def leaves(trees: Trees = 60, jobs: Jobs = 2, output: Output = None) -> None:
+    """Doubts of trees that have leaves, or none."""
+    work = [(dict(tree=seed), (seed,)) for seed in range(trees)]
+    publish(run(forest.measure_leaves, work, jobs), forest.leaf_tables, output)
+
+
+@app.command()
 def models(
     paths: Annotated[list[Path], typer.Argument(metavar="CLOUD MODEL...", exists=True, dir_okay=False)],
     unit: Annotated[float, typer.Option("--unit", help="Of the clouds, in metres, as models are.")] = 1,

@@ -14,11 +14,10 @@ from ...geometry.frame import MIN_POINTS, Frame
 from ...geometry.neighbourhoods import spacing
 from ...interop.clouds import SurfaceMesh, to_point_cloud
 from ...interop.packages import import_open3d, require
+from ...interop.poisson import CELL, poisson_mesh
 
-CELL = 1.25  # measured: side of the octree's cells, in spacings: smaller ones follow noise, larger ones close holes
 SLIVER = 1e-12  # precision: of the mean area of triangles
 LEAST_CELLS = 4  # derived: across a surface: the octree is at least two deep
-FULL_DEPTH = 4  # speed: of the octree, down to which it is a full grid
 REACH = 2.5  # fitted: cells from the nearest point: what is farther away is no surface
 LEAST_PART = 0.02  # fitted: of the area of the largest: smaller ones are bubbles
 BALL_RADII = (1.0, 2.0, 4.0)  # fitted: of the rolling balls, in spacings
@@ -101,12 +100,10 @@ def poisson(points: np.ndarray, outward: np.ndarray, edge: float) -> Solid:
 
     `edge` is the spacing that its cells go by. What is far from all points is left out, and so are small parts.
     """
-    o3d, cloud, cell = import_open3d(), to_point_cloud(points), CELL * edge
+    cell = CELL * edge
     if cell > np.ptp(points, axis=0).max() / LEAST_CELLS:
         raise InvalidCloudError(f"{len(points)} points are too few for a surface to be reconstructed")
-    cloud.normals = o3d.utility.Vector3dVector(outward)
-    octree = dict(depth=0, width=cell, full_depth=FULL_DEPTH, linear_fit=True, n_threads=1)
-    mesh, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, **octree)
+    mesh = poisson_mesh(points, outward, edge)
     mesh.remove_vertices_by_mask(cKDTree(points).query(np.asarray(mesh.vertices))[0] > REACH * cell)
     return Solid.of(mesh, "poisson", least_part=LEAST_PART)
 

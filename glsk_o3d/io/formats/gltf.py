@@ -66,8 +66,8 @@ def save_rig(
     mesh : triangle mesh or cloud, optional
         Of Open3D, or anything that carries points. By default the skeleton's tubes, or if it has no radii, its points.
     joints : int, optional
-        How many joints, ends of limbs among them: the junctions and ends first, then the farthest bends and the middles
-        of long bones.
+        How many joints, each with its bone, the file has: bones from junction to junction and end first, which are then
+        parted at the farthest bends and in the middle of long ones.
     symmetric : bool
         Joints of limbs that are mirror images of each other are, too, those in the plane of symmetry are exactly there,
         and names of mirrored bones end in ``_left`` and ``_right``. The plane is that of the points.
@@ -90,7 +90,7 @@ def save_rig(
     InvalidCloudError
         The surface has another size or place than the skeleton.
     InvalidParameterError
-        There is no such axis; the root is outside of the cloud; or there are more ends and junctions than `joints`.
+        There is no such axis; the root is outside of the cloud; or more than `joints` bones between ends and junctions.
 
     Examples
     --------
@@ -106,7 +106,7 @@ def save_rig(
     check_ending(path, "rig is glTF", RIG_ENDING)
     if up not in UPRIGHT:
         raise InvalidParameterError(f"up = {up!r}: must be one of {', '.join(UPRIGHT)}")
-    check_number("joints", joints, "int?", low=2)
+    check_number("joints", joints, "int?", low=1)
     drawn = _surface(skeleton) if mesh is None else mesh
     points, triangles = surface_mesh(drawn)
     _check_fit(skeleton, points)

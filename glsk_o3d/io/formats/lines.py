@@ -1,12 +1,13 @@
-"""OBJ and VTP: vertices and edges, or branches, to the last bit; no cloud, no report.
+"""OBJ, VTP, DXF and GraphML: vertices and edges, or branches, to the last bit; no cloud, no report.
 
 OBJ has edges as ``l`` lines, and no radii; scans are OBJ files, too, and a skeleton is one that has lines. VTP, VTK's
-polydata, has the radii and confidences too, and the cell array ``branch`` counts the polylines. A vertex without edges
-is a point.
+polydata, has the radii and confidences too, and the cell array ``branch`` counts the polylines. DXF, as release 12 has
+it, has the polylines alone. In both a vertex without edges is a point. GraphML has all that is known of vertices.
 """
 
 import base64
 from collections.abc import Iterable
+from io import BytesIO
 from itertools import chain, pairwise
 from pathlib import Path
 from typing import BinaryIO
@@ -15,6 +16,7 @@ from xml.etree import ElementTree as xml
 import numpy as np
 
 from ...data.skeleton import Skeleton
+from ...interop.packages import require
 from ..scan import Scan
 from .graphs import NoEdges, graph_skeleton, line, text, words_by_line
 from .ply import Lists, triangles
@@ -95,6 +97,29 @@ def write_vtp(skeleton: Skeleton) -> bytes:
     _vtk_cells(piece, "Lines", paths)
     written: bytes = xml.tostring(root, encoding="utf-8", xml_declaration=True)
     return written
+
+
+def write_dxf(skeleton: Skeleton) -> bytes:
+    """The content of a DXF file: its section of entities, which is all that release 12 needs, as pairs of lines."""
+    layer = (8, "0")  # which all drawings have
+    tags: list[tuple[int, object]] = [(0, "SECTION"), (2, "ENTITIES")]
+    for path in skeleton.branches:
+        tags += [(0, "POLYLINE"), layer, (66, 1), (70, 8)]  # vertices follow; it is in space
+        for vertex in skeleton.vertices[path].tolist():
+            tags += [(0, "VERTEX"), layer, (70, 32), *zip((10, 20, 30), vertex, strict=True)]
+        tags += [(0, "SEQEND"), layer]
+    for vertex in skeleton.vertices[skeleton.degree == 0].tolist():
+        tags += [(0, "POINT"), layer, *zip((10, 20, 30), vertex, strict=True)]
+    return text(f"{code}\n{value}" for code, value in [*tags, (0, "ENDSEC"), (0, "EOF")])
+
+
+def write_graphml(skeleton: Skeleton) -> bytes:
+    """The content of a GraphML file, whose nodes have coordinates ``x``, ``y`` and ``z``, as it holds no tuples."""
+    graph, stream = skeleton.to_networkx(), BytesIO()
+    for _, facts in graph.nodes(data=True):
+        facts |= dict(zip("xyz", facts.pop("position"), strict=True))
+    require("networkx").write_graphml_xml(graph, stream)
+    return stream.getvalue()
 
 
 def _vtk_cells(piece: xml.Element, name: str, paths: Iterable[np.ndarray]) -> None:

@@ -165,24 +165,14 @@ def frames_of(skeleton: Skeleton) -> np.ndarray:
     Returns
     -------
     (M, 4, 4) float array
-        In the order of `skeleton.vertices`. x leads from the end of the branch with the smaller number to the other: in
-        trees of the pipeline ``tree`` away from the root. A junction has the direction of its longest branch; a vertex
-        without edges is not turned, and on a vertical curve y is not.
+        In the order of `skeleton.vertices`. x is that of `Skeleton.tangents`: in trees of the pipeline ``tree`` it
+        leads away from the root. A vertex without edges is not turned, and on a vertical curve y is not.
     """
-    along = np.zeros_like(skeleton.vertices)
-    length = [np.linalg.norm(np.diff(skeleton.vertices[path], axis=0), axis=1).sum() for path in skeleton.branches]
-    for row in np.argsort(length, kind="stable"):  # the longest has the last word
-        path = skeleton.branches[row]
-        closed = path[0] == path[-1] and skeleton.degree[path[0]] == 2
-        before, behind = (path[-2], path[1]) if closed else (path[0], path[-1])
-        around = skeleton.vertices[np.concatenate([[before], path, [behind]])]
-        along[path] = around[2:] - around[:-2]
-    size = np.linalg.norm(along, axis=1, keepdims=True)
-    x = np.divide(along, size, out=np.tile([1.0, 0.0, 0.0], (len(along), 1)), where=size > 0)
-    y = np.column_stack([-x[:, 1], x[:, 0], 0 * size])
+    x = np.where(skeleton.degree[:, None] > 0, skeleton.tangents, [1.0, 0, 0])
+    y = np.column_stack([-x[:, 1], x[:, 0], 0 * x[:, 2]])
     flat = np.linalg.norm(y, axis=1, keepdims=True)
     y = np.divide(y, flat, out=np.tile([0.0, 1.0, 0.0], (len(y), 1)), where=flat > UPRIGHT)
-    frames = np.tile(np.eye(4), (len(along), 1, 1))
+    frames = np.tile(np.eye(4), (len(x), 1, 1))
     for column, vectors in enumerate((x, y, np.cross(x, y), skeleton.vertices)):
         frames[:, :3, column] = vectors
     return frames

@@ -11,6 +11,8 @@ PARAMETERS = {
     "cluster": (0.0, "Distance between clusters, of which the largest is skeletonised; 0 to skeletonise all points."),
     "min_points": (100, "Fewest points to skeletonise."),
     "opening": (0.0, "Widest opening of a gripper: poses are then grasps; 0 for frames along the curve."),
+    "max_places": (0, "Most places to search for grasps, the most promising ones; 0 for all."),
+    "seconds": (0.0, "Wall time after which no further place is searched for grasps; 0 for no limit."),
     "accept": ("doubtful", "Worst verdict of a skeleton that is accepted, and gets grasps."),
 }
 """Default and meaning by name. Lengths are in the cloud's units, places in the target frame."""

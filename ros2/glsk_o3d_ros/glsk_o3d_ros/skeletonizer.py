@@ -79,11 +79,15 @@ class Skeletonizer:
         cluster: float,
         min_points: int,
         opening: float,
+        max_places: int,
+        seconds: float,
         accept: str,
     ) -> None:
-        for name, length in (("opening", opening), ("plane_distance", plane_distance), ("cluster", cluster)):
-            check_number(name, length, low=0)
-        check_number("max_points", max_points, "int", low=0)
+        numbers = dict(opening=opening, plane_distance=plane_distance, cluster=cluster, seconds=seconds)
+        for name, number in numbers.items():
+            check_number(name, number, low=0)
+        for name, number in dict(max_points=max_points, max_places=max_places).items():
+            check_number(name, number, "int", low=0)
         if len(plane) != 4:
             raise InvalidParameterError(
                 f"plane = {list(plane)}: must be a, b, c, d of ax + by + cz + d = 0; all 0 for none"
@@ -98,7 +102,8 @@ class Skeletonizer:
         self.make, self.min_points, self.max_points = make, min_points, max_points
         self.crop = np.reshape(crop, (2, 3)) if any(crop) else None
         self.plane_distance, self.cluster = plane_distance, cluster
-        self.gripper, self.accept = Gripper(opening) if opening else None, Verdict(accept)
+        self.gripper = Gripper(opening) if opening else None
+        self.accept, self.budget = Verdict(accept), dict(max_places=max_places or None, seconds=seconds or None)
         self.pipeline = override(as_pipeline(pipeline), filter(None, set))
 
     def __call__(self, cloud: Any, transform: Any = None) -> Results:
@@ -119,8 +124,9 @@ class Skeletonizer:
             if self.gripper is None:
                 frames = frames_of(skeleton)
             else:
-                around = {} if mask.all() else dict(cloud=scene, mask=mask)
-                frames = grasp_candidates(skeleton, self.gripper, plane=plane, accept=self.accept, **around).poses
+                options: dict[str, Any] = dict(plane=plane, accept=self.accept, **self.budget)
+                options |= {} if mask.all() else dict(cloud=scene, mask=mask)
+                frames = grasp_candidates(skeleton, self.gripper, **options).poses
         branch = np.full(len(scene), -1)
         if len(skeleton.vertices):
             branch[mask] = segment(skeleton)

@@ -1,9 +1,9 @@
-"""OBJ and VTP: as others write them, and as others read ours."""
+"""OBJ, VTP, DXF and GraphML: as others write them, and as others read ours."""
 
 import numpy as np
 import pytest
 
-from glsk_o3d import save_skeleton
+from glsk_o3d import Skeleton, save_skeleton
 from glsk_o3d.io.scans import read_scan
 from glsk_o3d.io.skeletons import read_skeleton
 
@@ -49,6 +49,39 @@ def test_vtk_reads_vertices_branches_and_radii(skeleton, tmp_path):
     for i, path in enumerate(skeleton.branches):
         cell = back.GetCell(alone + i)
         assert [cell.GetPointId(j) for j in range(cell.GetNumberOfPoints())] == path.tolist()
+
+
+def test_ezdxf_reads_branches_and_lone_vertices(skeleton, tmp_path):
+    save_skeleton(skeleton, tmp_path / "s.dxf")
+    drawing = pytest.importorskip("ezdxf").readfile(tmp_path / "s.dxf").modelspace()
+    lines = drawing.query("POLYLINE")
+    assert len(lines) == len(skeleton.branches)
+    for line, path in zip(lines, skeleton.branches, strict=True):
+        assert line.is_3d_polyline
+        np.testing.assert_array_equal([point.xyz for point in line.points()], skeleton.vertices[path])
+    points = [point.dxf.location.xyz for point in drawing.query("POINT")]
+    assert points == [*map(tuple, skeleton.vertices[skeleton.degree == 0].tolist())]
+
+
+def test_dxf_is_pairs_of_codes_and_values(tmp_path):
+    graph = Skeleton([[0.1, 2, 3], [4, 5, 1e-9], [7, 8, 9]], [[0, 1]], [1, 1, 1], (), (), ())
+    save_skeleton(graph, tmp_path / "s.dxf")
+    words = (tmp_path / "s.dxf").read_text().split("\n")[:-1]
+    pairs = [*zip(map(int, words[::2]), words[1::2], strict=True)]
+    assert (pairs[0], pairs[1], pairs[-1]) == ((0, "SECTION"), (2, "ENTITIES"), (0, "EOF"))
+    kinds = [value for code, value in pairs if code == 0]
+    assert kinds == ["SECTION", "POLYLINE", "VERTEX", "VERTEX", "SEQEND", "POINT", "ENDSEC", "EOF"]
+    assert [float(value) for code, value in pairs if code in (10, 20, 30)] == [0.1, 2, 3, 4, 5, 1e-9, 7, 8, 9]
+
+
+def test_networkx_reads_the_graph_and_its_measures(skeleton, tmp_path):
+    save_skeleton(skeleton, tmp_path / "s.graphml")
+    back = pytest.importorskip("networkx").read_graphml(tmp_path / "s.graphml", node_type=int)
+    assert [*back] == [*range(len(skeleton.vertices))]
+    for name, values in (*zip("xyz", skeleton.vertices.T, strict=True), ("radius", skeleton.radii)):
+        np.testing.assert_array_equal([facts[name] for _, facts in back.nodes(data=True)], values)
+    assert {tuple(sorted(edge)) for edge in back.edges} == {*map(tuple, skeleton.edges.tolist())}
+    np.testing.assert_allclose([back.edges[edge]["length"] for edge in skeleton.edges.tolist()], skeleton.edge_lengths)
 
 
 # -------------------------------------------------------------------------------------------------------------- meshes
