@@ -106,7 +106,7 @@ class Refiner(Filter[Skeleton, Skeleton]):
     def run(self, skeleton: Skeleton, context: RunContext) -> Skeleton:
         curve = Curve.of(skeleton)
         if skeleton.report.on_medial_axis and self.handle < 1:  # the solid has answered
-            return replace(self, handle=0, air=0, bridge=0)._run(curve)
+            return replace(self, handle=0, air=0, bridge=0, limb=0)._run(curve)
         return self._run(curve)
 
     def _run(self, curve: Curve) -> Skeleton:
