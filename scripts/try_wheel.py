@@ -1,12 +1,17 @@
 """Installs the wheel alone, with each extra and with the benchmark, in folders of their own, and runs every command.
 
+With the benchmark it also makes ten clouds and scores ten answers, which must be to the last bit what is kept.
+
     python scripts/try_wheel.py [EXTRA ...]
 
 Prints a table: what was installed, how many seconds and megabytes it took, and which extras commands asked for. A
 command may succeed, or end with a message that names an extra; anything else is an error.
 """
 
+import gzip
+import json
 import math
+import os
 import re
 import subprocess
 import sys
@@ -18,6 +23,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 USERS = ("pictures", "crosscheck", "meshlab", "las", "e57", "graph", "full")
 BENCH = "bench"  # the wheel beside it, with glsk-bench
+TEN = ROOT / "benchmarks" / "v3" / "ten.json.gz"
 TABLE = "x,y,z,tree\n" + "".join(f"{x},{y},{z},{x % 2}\n" for x in range(40) for y in (0, 1, 2) for z in (0, 1, 2))
 RING = "".join(  # clean and dense, so that a mesh closes around it
     f"{(3 + math.cos(v)) * math.cos(u)} {(3 + math.cos(v)) * math.sin(u)} {math.sin(v)}\n"
@@ -77,13 +83,41 @@ def try_extra(wheel: Path, bench: Path, extra: str, folder: Path) -> tuple[float
         (here / name).write_bytes(b"none")
     asked, wrong = [], []
     for line in COMMANDS.splitlines():
-        done = subprocess.run([binaries / "glsk", *line.split()], cwd=here, capture_output=True, text=True)
+        done = run(binaries / "glsk", here, *line.split())
         said = done.stderr.strip().splitlines()[-1:] or [""]
         if wants := re.search(r'pip install (?:"glsk-o3d\[|\./)(\w+)', done.stderr):
             asked.append(wants[1])
         elif done.returncode and not (line.startswith("info scan") and "not a valid" in said[0]):
             wrong.append(f"glsk {line}: {said[0]}")
+    if extra == BENCH:
+        wrong += try_ten(binaries / "glsk", here)
     return seconds, megabytes, sorted(set(asked)), wrong
+
+
+def try_ten(glsk: Path, here: Path) -> list[str]:
+    """Make ten clouds and score ten answers that are kept; gives what differs from what is kept, in any bit."""
+    kept = json.loads(gzip.decompress(TEN.read_bytes()))
+    words = {name: name.split("_") for name in kept}
+    families, seeds, variants = (",".join(dict.fromkeys(it)) for it in zip(*words.values(), strict=True))
+    (here / "answers").mkdir()
+    for name, it in kept.items():
+        lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in it["vertices"]] + [f"l {a + 1} {b + 1}" for a, b in it["edges"]]
+        (here / "answers" / f"{name}.obj").write_text("\n".join(lines))
+    choice = ("--version", "v3", "--families", families, "--seeds", seeds, "--variants", variants)
+    made = json.loads(run(glsk, here, "benchmark", "make", "ten", *choice, "--json", check=True).stdout)
+    run(glsk, here, "benchmark", "score", "ten", "answers", "-o", "ten.json", "-q", check=True)
+    rows = {f"{row['shape']}_{row['variant']}": row for row in json.loads((here / "ten.json").read_text())["clouds"]}
+    wrong = [] if made["sameness"]["bits"] == len(kept) else [f"clouds that are not the same: {made['sameness']}"]
+    for name, it in kept.items():
+        differ = [score for score, value in it["scores"].items() if rows[name][score] != value]
+        wrong += [f"{name}: other scores: {', '.join(differ)}"] if differ else []
+    return wrong
+
+
+def run(glsk: Path, here: Path, *words: str, check: bool = False) -> subprocess.CompletedProcess:
+    """Run a command in a folder, with nothing of a clone on its path."""
+    bare = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    return subprocess.run([glsk, *words], cwd=here, env=bare, capture_output=True, text=True, check=check)
 
 
 def size(folder: Path) -> int:

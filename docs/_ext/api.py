@@ -97,6 +97,7 @@ NAMES = {
         "Answers": ("run",),
         "Scores": ("score", "Scores", "score_answers", "Results", "read_results", "leaderboard", "Leaderboard"),
         "Repeated": ("sample", "repeat", "Repeat", "spread"),
+        "Raters": ("draw_sheet", "rates", "kappa"),
     },
     "benchmark_shapes": {"One draw": ("shape", "Shape", "Thing")},
     "benchmark_clouds": {"One draw": ("cloud",), "The visible share of the axis": ("coverage",)},

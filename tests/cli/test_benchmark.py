@@ -55,11 +55,25 @@ def test_from_a_program_to_a_table(invoke, bench, program, tmp_path):
         (1, ("run", "none", "out"), "make a benchmark with 'glsk benchmark make none' first"),
         (2, ("score", "bench", "bench", "-o", "s.csv"), "its name ends in .json"),
         (2, ("table", "bench/benchmark.json", "-o", "t.csv"), "its name ends in .md or .json"),
+        (1, ("rates", "bench/benchmark.json", "bench/benchmark.json"), "not the table of a sheet"),
     ],
 )
 @pytest.mark.usefixtures("bench")
 def test_what_is_wrong_is_one_line(refused, code, words, message):
     assert message in refused(code, "benchmark", *words)
+
+
+@pytest.mark.usefixtures("small")
+def test_from_a_sheet_to_the_agreement_of_two_raters(invoke, perfect, tmp_path):
+    words = ("sheet", "bench", perfect, "-o", "s.png", "--skeletons", 2)
+    assert invoke("benchmark", *words).stdout == "wrote s.png\nwrote s.csv\n"
+    sheet = (tmp_path / "s.csv").read_text()
+    assert sheet.startswith("number,cloud,answer\n1,")
+    for name, word in (("a", "accept"), ("b", "edit")):
+        (tmp_path / f"{name}.csv").write_text(sheet.replace(",\n", f",{word}\n"))
+    found = json.loads(invoke("benchmark", "rates", "a.csv", "b.csv", "--json").stdout)
+    assert (found["clouds"], found["accept"], found["agree"], found["kappa"]) == (2, [1.0, 0.0], 0.0, 0.0)
+    assert invoke("benchmark", "rates", "a.csv", "a.csv").stdout.splitlines()[-1].split() == ["kappa", "-"]
 
 
 def test_making_scoring_and_tables_need_no_open3d(bench, tmp_path):

@@ -1,6 +1,7 @@
 from .folders import BenchmarkFolder, read_folder
 from .making import make
 from .own import add_shape
+from .rating import draw_sheet, kappa, rates
 from .repeating import Repeat, repeat, spread
 from .running import run
 from .sampling import sample
@@ -16,8 +17,11 @@ __all__ = [
     "Scores",
     "ThingTruth",
     "add_shape",
+    "draw_sheet",
+    "kappa",
     "leaderboard",
     "make",
+    "rates",
     "read_folder",
     "read_results",
     "repeat",

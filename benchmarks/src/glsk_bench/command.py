@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -45,7 +46,7 @@ def make(
         list[str] | None, typer.Option(metavar="NAMES", help="Of clouds, with commas; by default all of the version.")
     ] = None,
     version: Annotated[
-        str, typer.Option(metavar="NAME", help="Of the benchmark: v1, round shapes, or v2, things.")
+        str, typer.Option(metavar="NAME", help="Of the benchmark: v1, round shapes; v2 or v3, things.")
     ] = "v1",
     jobs: Jobs = None,
     as_json: Json = False,
@@ -236,6 +237,48 @@ def repeat(
             found.save(path)
         names = [str(path) for path in files]
         _tell({**found.as_dict(), "files": names}, found.markdown().rstrip(), as_json, quiet, files)
+
+
+@app.command()
+def sheet(
+    folder: Folder,
+    answers: Answers,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="PNG", help="The picture; the raters' CSV is put beside it.")
+    ],
+    n: Annotated[int, typer.Option("--skeletons", metavar="N", min=1, help="Of clouds taken at random.")] = 24,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="The same takes the same clouds.")] = 0,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Draw skeletons for raters, and the table that each of them fills in: accept, edit or reject."""
+    with reporting(quiet=quiet, verbose=verbose):
+        from glsk_o3d.cli.outputs import PICTURE, Output, check_outputs
+
+        from .rating import draw_sheet
+
+        draw = partial(draw_sheet, folder, n=n, seed=seed)
+        check_outputs([Output(output, *PICTURE, draw)])
+        clouds = draw(answers, output)
+        files = [output, output.with_suffix(".csv")]
+        _tell({"clouds": clouds, "files": [str(path) for path in files]}, "", as_json, quiet, files)
+
+
+@app.command()
+def rates(
+    first: Annotated[Path, typer.Argument(metavar="CSV", help="The table of a sheet, filled in by one rater.")],
+    second: Annotated[Path, typer.Argument(metavar="CSV", help="The same by another.")],
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """The accept rates of two raters of a sheet, and Cohen's kappa."""
+    with reporting(quiet=quiet, verbose=verbose):
+        from .rating import rates as of_raters
+
+        told = of_raters(first, second)
+        _tell(told, {**told, "kappa": "-" if told["kappa"] is None else told["kappa"]}, as_json, quiet)
 
 
 @app.command()

@@ -6,12 +6,14 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import product
+from operator import itemgetter
 from pathlib import Path
+from statistics import fmean
 from typing import Any, NamedTuple
 
 import numpy as np
 import typer
-from glsk_bench import BenchmarkFolder, Repeat, Results, read_results
+from glsk_bench import BenchmarkFolder, Repeat, Results, leaderboard, read_results
 from glsk_bench.repeating import PLACES
 from glsk_bench.scoring import OF_THINGS, answer_files
 from glsk_bench.table import mean_with_interval, told
@@ -21,15 +23,17 @@ from glsk_o3d.interop.atomic import write_json
 from glsk_o3d.interop.clouds import cloud_points
 from glsk_o3d.recipes.catalogue import named_pipeline
 
-from .peers import PEERS, skeleton_of
+from .peers import PEERS, peers_of, skeleton_of
 from .tables import BLUE, ORANGE, ROOT, Table, grouped, keep, number, read, save_figure, sheet, write_packed
 
 KEPT = ROOT / "benchmarks"  # a folder of it for each version of the benchmark
+KINDS = {"things": "v3", "tubes": "v1"}  # of shapes, and the version of which answers are kept
 DECIMALS = 4  # of what is kept, far more than intervals are wide
 GOLDEN = ROOT / "tests" / "golden"
 KNOWN = {"y_unequal": (1, 0, 3), "torus": (1, 1, 0), "quadruped": (1, 0, 6)}  # components, loops, leaves
 
 OURS = "default"
+FIRST = ("perfect", "topology", "tips_f1", "junctions_f1", "error")
 LEAST_SHAPES = 3  # of which a difference is told
 MEASURES = {  # what may be lost, its digits, and whether more of it is better; of what has a sign, its size counts
     "perfect": ("perfect", 2, True),
@@ -46,10 +50,11 @@ MEASURES = {  # what may be lost, its digits, and whether more of it is better; 
     "mirror": ("mirror", 3, False),
     "junction_offset": ("junction offset", 2, False),
 }
-SHORT = {"clean": "clean", "scan2": "two cameras", "noise1": "1 % noise"}
 NUMBER = re.compile(r"(?<!code )(?<!signal )\d+(?:\.\d+)?")  # of a reason; those of codes and signals are names
 VIEW = (14, -60)  # elevation and azimuth, in degrees
 SPREAD = ("moved", "agree", "loops", "ends")  # of several clouds of an object, with intervals
+
+PERFECT = itemgetter("shape", "variant", "perfect")
 
 Seconds = dict[str, dict[str, Any]]
 
@@ -96,8 +101,15 @@ def kept(version: str) -> list[Entry]:
     return [Entry(read_results(path), read(path)["made"]) for path in paths if path.is_file()]
 
 
+def keep_ten(version: str, found: Mapping[str, Any]) -> Path:
+    """Write some answers and their scores, packed; gives the path."""
+    path = kept_file(version, "ten.json.gz")
+    write_packed(path, dict(found))
+    return path
+
+
 def keep_seconds(version: str, found: Seconds) -> None:
-    """Keep the median CPU seconds `cpu` of some tools, and `where` they were measured, beside those of others."""
+    """Keep the median CPU seconds `cpu` of some tools, their memory `mb`, and `where` that was, with what is there."""
     path = kept_file(version, "seconds.json")
     path.parent.mkdir(exist_ok=True)
     write_json(path, seconds(version) | found)
@@ -142,8 +154,21 @@ def recorded() -> Table:
     return "components / loops / leaves", ["", *KNOWN], [[name, *cells] for name, cells in lines.items()]
 
 
-def overview(board: Sequence[dict[str, Any]], cpu: Seconds) -> Table:
-    """All tools over all clouds, the best first: the entries of a `Leaderboard`."""
+def ranked(entries: Sequence[Entry]) -> list[dict[str, Any]]:
+    """The entries of a `Leaderboard`, of which some may have a part of the clouds; the best first.
+
+    Each also has `ours`, the share of its clouds in which `default` is perfect.
+    """
+    ours = {it[:2]: it[2] for entry in entries if entry.tool == OURS for it in map(PERFECT, entry.results.rows)}
+    rows = []
+    for entry in entries:
+        known = [ours[it[:2]] for it in map(PERFECT, entry.results.rows) if it[:2] in ours]
+        rows.append(leaderboard([entry.results]).entries[0] | {"ours": fmean(known) if known else None})
+    return sorted(rows, key=lambda row: [-row["all"][measure][0] for measure in ("perfect", "topology")])
+
+
+def overview(board: Sequence[dict[str, Any]], cpu: Seconds, kind: str) -> Table:
+    """All tools over all clouds, the best first: what `ranked` gives."""
     lines, more = [], [name for name in OF_THINGS if name in MEASURES and any(entry["all"][name] for entry in board)]
     for entry in board:
         name, mean = entry["name"], entry["all"]
@@ -152,27 +177,60 @@ def overview(board: Sequence[dict[str, Any]], cpu: Seconds) -> Table:
         error = told(*mean["error"], 3) if mean["error"] else "-"
         rest = [number(mean[measure] and mean[measure][0], 3) for measure in ("inside", "completeness")]
         rest += [told(*mean[it], MEASURES[it][1]) if mean[it] else "-" for it in more]
-        lines.append([*_label(name), *shares, *plain, error, *rest, str(mean["failures"]), _cpu(cpu, name)])
+        counts = [str(mean["clouds"]), str(mean["failures"])]
+        lines.append([*_label(name, kind), *shares, *plain, error, *rest, *counts, _fact(cpu, name, "cpu", 2)])
     heads = ["tips F1", "junctions F1", "error", "inside", "complete"]
-    heads += [*(MEASURES[it][0] for it in more), "failures", "CPU s"]
-    first = board[0]["all"]
-    title = f"{first['clouds']} clouds of {first['shapes']} random shapes"
-    return title, ["", "takes", "perfect", "topology", *heads], lines
+    heads += [*(MEASURES[it][0] for it in more), "clouds", "failures", "CPU s"]
+    return _size(board), ["", "takes", "perfect", "topology", *heads], lines
 
 
-def short(board: Sequence[dict[str, Any]], cpu: Seconds) -> Table:
-    """The same in few columns, with the best way to run each tool alone."""
-    best: dict[str, list[str]] = {}
-    for entry in board:
-        name, mean, groups = entry["name"], entry["all"], entry["variants"]
-        tool = _label(name)[0].partition(",")[0]
-        shares = [number(groups[it]["topology"][0], 2) for it in SHORT if it in groups]
-        error = number(mean["error"] and mean["error"][0], 2)
-        cells = [*shares, number(mean["topology"][0], 2), number(mean["perfect"][0], 2), error]
-        best.setdefault(tool, [tool, *cells, _cpu(cpu, name)])
-    kinds = [words for it, words in SHORT.items() if it in board[0]["variants"]]
-    heads = ["", *kinds, f"all {len(board[0]['variants'])} kinds", "perfect", "error", "CPU s"]
-    return "right components and loops, share of the clouds", heads, list(best.values())
+def both(things: Sequence[dict[str, Any]], tubes: Sequence[dict[str, Any]], cpu: Seconds) -> Table:
+    """The same in few columns, of things and of tubes."""
+    of_things, of_tubes = ({entry["name"]: entry for entry in board} for board in (things, tubes))
+    lines = []
+    for name in {**of_things, **of_tubes}:
+        cells = ["-"] * 6
+        if entry := of_things.get(name):
+            mean = entry["all"]
+            shares = [told(*mean["perfect"]), number(entry["ours"], 2), told(*mean["topology"])]
+            rest = [number(mean[measure] and mean[measure][0], 2) for measure in ("tips_f1", "error")]
+            cells = [str(mean["clouds"]), *shares, *rest]
+        here = [board[name]["all"] for board in (of_things, of_tubes) if name in board]
+        there = of_tubes[name]["all"] if name in of_tubes else {}
+        cells += [number((there.get(it) or [None])[0], 2) for it in ("perfect", "topology", "error")]
+        cells += [str(sum(mean["failures"] for mean in here)), _fact(cpu, name, "cpu", 2), _fact(cpu, name, "mb", 0)]
+        label, takes = _label(name, "things")
+        on_tubes = _label(name, "tubes")[1]
+        lines.append([label, takes if takes == on_tubes else f"{takes}; tubes: {on_tubes}", *cells])
+    heads = ["things", "perfect", "`default` there", "topology", "tips F1", "error"]
+    heads += ["tubes: perfect", "topology", "error"]
+    title = f"things: {_size(things)}; tubes: {_size(tubes)}"
+    return title, ["", "takes", *heads, "failures", "CPU s", "MB"], lines
+
+
+def short(things: Sequence[dict[str, Any]], tubes: Sequence[dict[str, Any]], cpu: Seconds) -> Table:
+    """In fewer columns, with the best way to run each tool alone."""
+    cells: dict[str, list[str]] = {}
+    spent: dict[str, str] = {}
+    for board in (things, tubes):
+        best: dict[str, list[str]] = {}
+        for entry in board:
+            mean = entry["all"]
+            shares = [number(mean[it] and mean[it][0], 2) for it in ("topology", "perfect", "error")]
+            best.setdefault(_tool(entry["name"]), [str(mean["clouds"]), *shares])
+            spent.setdefault(_tool(entry["name"]), _fact(cpu, entry["name"], "cpu", 2))
+        for tool in {**cells, **best}:
+            done = cells.setdefault(tool, ["-"] * 4 if board is tubes else [])
+            done += best.get(tool, ["-"] * 4)
+    heads = [head for kind in ("things", "tubes") for head in (kind, "topology", "perfect", "error")]
+    lines = [[tool, *row, spent[tool]] for tool, row in cells.items()]
+    return f"things: {_size(things)}; tubes: {_size(tubes)}", ["", *heads, "CPU s"], lines
+
+
+def _size(board: Sequence[dict[str, Any]]) -> str:
+    """How many clouds and shapes, of the tool that has most."""
+    first = max((entry["all"] for entry in board), key=lambda mean: mean["clouds"])
+    return f"{first['clouds']} clouds of {first['shapes']} random shapes"
 
 
 class Worse(NamedTuple):
@@ -194,49 +252,71 @@ class Worse(NamedTuple):
 
 
 def worse(entries: Sequence[Entry]) -> list[Worse]:
-    """All of these, by clouds, tool and measure; fewer than three shapes have no interval to speak of."""
+    """All of these, by clouds, tool and measure; fewer than three shapes have no interval to speak of.
+
+    Of one family as one kind of cloud there are those of the first measures, with an interval without 0.
+    """
     by_name = {entry.tool: {(row["shape"], row["variant"]): row for row in entry.results.rows} for entry in entries}
-    ours, found = by_name.pop(OURS), []
+    ours, found = by_name.pop(OURS, {}), []
     groups: dict[str, list] = {"all": [*ours]}
     for part in ("variant", "family"):
         for key, row in ours.items():
             groups.setdefault(row[part], []).append(key)
+    parts = {*groups}
+    for key, row in ours.items():
+        groups.setdefault(f"{row['family']} {row['variant']}", []).append(key)
     for (group, here), (name, theirs), measure in product(groups.items(), by_name.items(), MEASURES):
-        pairs = [(theirs[key][measure], ours[key][measure]) for key in here]
-        pairs = [(abs(a), abs(b)) if None not in (a, b) else None for a, b in pairs]
-        known = [(key[0], pair) for key, pair in zip(here, pairs, strict=True) if pair]
+        if group not in parts and measure not in FIRST:
+            continue
+        pairs = [(key[0], (theirs[key][measure], ours[key][measure])) for key in here if key in theirs]
+        known = [(shape, (abs(a), abs(b))) for shape, (a, b) in pairs if a is not None and b is not None]
         if len({shape for shape, _ in known}) >= LEAST_SHAPES:
             shapes, both = zip(*known, strict=True)
             difference = mean_with_interval(shapes, [other - mine for other, mine in both])
             _, digits, more = MEASURES[measure]
             if round(difference[0] if more else -difference[0], digits) > 0:
                 means = [sum(side) / len(both) for side in zip(*both, strict=True)]
-                found.append(Worse(group, name, measure, len({*shapes}), means, difference))
+                it = Worse(group, name, measure, len({*shapes}), means, difference)
+                found += [it] if group in parts or it.clear else []
     return found
 
 
-def losses(found: Sequence[Worse]) -> Table:
-    """Where `default` is worse than another tool, whatever shapes are drawn: intervals without 0."""
+def losses(found: Mapping[str, Sequence[Worse]]) -> Table:
+    """Where `default` is worse whatever shapes are drawn, intervals without 0: by kind, to the best other alone.
+
+    Of a family as several kinds of clouds that with the largest difference stands for all.
+    """
     lines = []
-    for it in found:
-        if it.clear:
-            words, digits, _ = MEASURES[it.measure]
-            means = [number(mean, digits) for mean in it.means]
-            difference = told(*it.difference, digits, sign="+")
-            lines.append([it.clouds, str(it.shapes), words, _from(it.tool), *means, difference])
-    header = ["clouds", "shapes", "measure", "to", "theirs", "`default`", "difference"]
+    for kind, here in found.items():
+        groups: dict[tuple[str, str, bool], list[Worse]] = {}
+        for it in here:
+            if it.clear:
+                where = it.clouds.partition(" ")[0]
+                groups.setdefault((where, it.measure, " " in it.clouds), []).append(it)
+        for (_, measure, _), those in groups.items():
+            words, digits, _ = MEASURES[measure]
+            best = max(those, key=lambda it: abs(it.difference[0]))
+            means = [number(mean, digits) for mean in best.means]
+            difference = told(*best.difference, digits, sign="+")
+            tools, clouds = ({getattr(it, fact) for it in those} for fact in ("tool", "clouds"))
+            more = str(len(tools) - 1) if len(tools) > 1 else ""
+            further = f", {len(clouds) - 1} more" if len(clouds) > 1 else ""
+            where = [f"{kind}, {best.clouds}{further}", str(best.shapes), words, _from(best.tool, kind)]
+            lines.append([*where, *means, difference, more])
+    header = ["clouds", "shapes", "measure", "to", "theirs", "`default`", "difference", "others"]
     return "where `default` is worse", header, lines
 
 
-def unclear(found: Sequence[Worse]) -> Table:
-    """Where the mean of `default` is worse, and other shapes could turn it: intervals with 0."""
-    groups: dict[tuple[str, str], list[str]] = {}
+def all_losses(found: Sequence[Worse], kind: str) -> Table:
+    """All of these by tool, and where the mean alone is worse, so that other shapes could turn it."""
+    groups: dict[tuple[str, str], tuple[list[str], list[str]]] = {}
     for it in found:
-        if not it.clear:
-            words, digits, _ = MEASURES[it.measure]
-            groups.setdefault((words, _from(it.tool)), []).append(f"{it.clouds} ({it.difference[0]:+.{digits}f})")
-    lines = [[*key, ", ".join(places)] for key, places in groups.items()]
-    return "where only the mean of `default` is worse", ["measure", "to", "which"], lines
+        words, digits, _ = MEASURES[it.measure]
+        groups.setdefault((_from(it.tool, kind), words), ([], []))[not it.clear].append(
+            f"{it.clouds} {it.difference[0]:+.{digits}f}"
+        )
+    lines = [[*key, *map(", ".join, places)] for key, places in groups.items()]
+    return "where the mean of `default` is worse", ["to", "measure", "interval without 0", "with 0"], lines
 
 
 def interval(rows: Sequence[dict[str, Any]], measure: str, digits: int = 2, of: str = "shape") -> str:
@@ -245,13 +325,20 @@ def interval(rows: Sequence[dict[str, Any]], measure: str, digits: int = 2, of: 
     return told(*mean_with_interval([row[of] for row in known], [row[measure] for row in known]), digits)
 
 
-def by_group(entries: Sequence[Entry], group: str, measure: str, digits: int, title: str) -> Table:
-    """The mean of a measure for each tool, by variant or by family, with intervals."""
-    sizes = Counter(row[group] for row in entries[0].results.rows)
-    lines = []
+def by_group(entries: Sequence[Entry], group: str, kind: str) -> Table:
+    """Right topologies, perfect ones and the error of each tool, by variant or by family."""
+    most = max(entries, key=lambda entry: len(entry.results.rows)).results.rows
+    lines, measures = [], ("topology", "perfect", "error")
     for entry in entries:
-        groups = grouped(entry.results.rows, group)
-        lines.append([*_label(entry.tool), *(interval(groups[name], measure, digits) for name in sizes)])
+        groups, cells = grouped(entry.results.rows, group), []
+        for name in dict.fromkeys(row[group] for row in most):
+            known = [[row[it] for row in groups.get(name, ()) if row[it] is not None] for it in measures]
+            cells.append(" / ".join(number(fmean(it) if it else None, 2) for it in known))
+        part = "" if len(entry.results.rows) == len(most) else f", {len(entry.results.rows)} clouds"
+        label, takes = _label(entry.tool, kind)
+        lines.append([f"{label}{part}", takes, *cells])
+    sizes = Counter(row[group] for row in most)
+    title = f"topology / perfect / error, by {'kind of cloud' if group == 'variant' else group}"
     return title, ["", "takes", *(f"{name} ({size})" for name, size in sizes.items())], lines
 
 
@@ -263,9 +350,11 @@ def repeated(found: Sequence[Repeat]) -> Table:
         where = [number((means["where"] or {}).get(place), 2) for place in PLACES]
         moved = [cells["moved"], number(means["median"], 2), *where]
         rest = [*(cells[name] for name in ("agree", "loops", "ends")), number(means["hooks"], 2)]
-        lines.append([*_label(it.name), *moved, *rest, str(means["failures"])])
+        double = [number((means["float32"] or {}).get(name), 2) for name in ("moved", "agree")]
+        lines.append([*_label(it.name, "things"), *moved, *rest, *double, str(means["failures"])])
     means = found[0].means()
     heads = ["moved", "median", "near ends", "near junctions", "elsewhere", "limbs", "agree", "loops", "ends", "hooks"]
+    heads += ["float32: moved", "float32: agree"]
     title = f"{means['draws']} clouds of {means['objects']} objects"
     return title, ["", "takes", *heads, "failures"], lines
 
@@ -274,42 +363,60 @@ def _last(value: float | None) -> float:
     return float("inf") if value is None else value
 
 
-def failures(entries: Sequence[Entry]) -> Table:
-    """Which clouds have no answer, by tool and reason."""
+def failures(entries: Mapping[str, Sequence[Entry]]) -> Table:
+    """How many clouds have no answer, by kind, tool and reason, and of which variants."""
     lines = []
-    for entry in entries:
-        groups: dict[str, list[tuple[str, str]]] = {}  # by the words of the reason, whatever its numbers
-        for row in entry.results.rows:
-            if row["failure"] is not None:
-                reason = row["failure"].removeprefix("no answer: ").replace("|", "/").split("\n")[0]
-                groups.setdefault(NUMBER.sub("#", reason), []).append((reason, f"{row['shape']}_{row['variant']}"))
-        for group in groups.values():
-            reasons, names = zip(*group, strict=True)
-            lines.append([*_label(entry.tool), _span(reasons), str(len(names)), ", ".join(names)])
-    return "failures", ["", "takes", "why", "clouds", "which"], lines
+    for kind, here in entries.items():
+        for entry in here:
+            groups: dict[str, list[tuple[str, str]]] = {}  # by the words of the reason, whatever its numbers
+            for row in entry.results.rows:
+                if row["failure"] is not None:
+                    reason = row["failure"].removeprefix("no answer: ").replace("|", "/").split("\n")[0]
+                    groups.setdefault(NUMBER.sub("#", reason), []).append((reason, row["variant"]))
+            for group in groups.values():
+                reasons, variants = zip(*group, strict=True)
+                which = ", ".join(f"{name} {n}" for name, n in Counter(variants).most_common())
+                label, takes = _label(entry.tool, kind)
+                lines.append([f"{kind}: {label}", takes, _span(reasons), which])
+    return "failures", ["", "takes", "why", "which"], lines
 
 
-def runs(entries: Sequence[Entry]) -> Table:
+def runs(entries: Mapping[str, Sequence[Entry]]) -> Table:
     """What the runs took, and what was run."""
-    lines = []
-    for entry in entries:
-        made = entry.made
-        packages = ", ".join(f"{name} {version}" for name, version in made["packages"].items()) or "glsk-o3d"
-        lines.append([*_label(entry.tool), packages, made["commit"] or "-", number(made["hours"], 2)])
-    hours = sum(entry.made["hours"] for entry in entries)
-    return "runs", ["", "takes", "packages", "commit", "hours"], [*lines, ["all", "", "", "", number(hours, 1)]]
+    lines, everything = [], [entry for here in entries.values() for entry in here]
+    for tool in dict.fromkeys(entry.tool for entry in everything):
+        these = {kind: entry.made for kind, here in entries.items() for entry in here if entry.tool == tool}
+        packages = {name: version for made in these.values() for name, version in made["packages"].items()}
+        words = ", ".join(f"{name} {version}" for name, version in packages.items()) or "glsk-o3d"
+        cells = [
+            cell
+            for kind in entries
+            for cell in (
+                [these[kind]["commit"] or "-", number(these[kind]["hours"], 2)] if kind in these else ["-"] * 2
+            )
+        ]
+        lines.append([*_label(tool, next(iter(these))), words, *cells])
+    heads = [head for kind in entries for head in (f"{kind}: commit", "hours")]
+    total = f"runs, {number(sum(entry.made['hours'] for entry in everything), 1)} hours of all"
+    return total, ["", "takes", "packages", *heads], lines
 
 
-def _cpu(cpu: Seconds, name: str) -> str:
-    return number(cpu[name]["cpu"], 2) if name in cpu else "-"
+def _fact(cpu: Seconds, name: str, fact: str, digits: int) -> str:
+    return number(cpu.get(name, {}).get(fact), digits)
 
 
-def _from(name: str) -> str:
-    return " of ".join(_label(name))
+def _tool(name: str) -> str:
+    return _label(name, "things")[0].partition(",")[0]
 
 
-def _label(name: str) -> tuple[str, str]:
-    return PEERS[name].label, PEERS[name].takes
+def _from(name: str, kind: str) -> str:
+    return " of ".join(_label(name, kind))
+
+
+def _label(name: str, kind: str) -> tuple[str, str]:
+    """What tables call a tool, and what it takes of shapes of a kind."""
+    peer = peers_of(KINDS[kind])[name]
+    return peer.label, peer.takes
 
 
 def _span(reasons: Sequence[str]) -> str:

@@ -5,29 +5,33 @@ The README of the benchmarks says what each command shows.
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from statistics import median
 from typing import Annotated
 
+import numpy as np
 import typer
-from glsk_bench import BenchmarkFolder, leaderboard, make, read_folder, repeat, sample, score_answers
+from glsk_bench import BenchmarkFolder, make, read_folder, repeat, sample, score, score_answers
 from glsk_bench.clouds import cloud
 from glsk_bench.scoring import TIMES_NAME, read_times
 from glsk_bench.shapes import shape
 from glsk_bench.versions import VERSIONS
 
-from glsk_o3d import read_cloud, save_skeleton
+from glsk_o3d import read_cloud, read_skeleton, save_skeleton
 from glsk_o3d.interop.atomic import write_json
 from glsk_o3d.interop.clouds import cloud_points
 
 from . import board
 from .board import Entry, kept, repeats, seconds
-from .peers import PEERS, Peer, installed, one_thread, silence, skeleton_of
+from .peers import PEERS, Peer, installed, one_thread, peers_of, silence, skeleton_of
 from .runs import Jobs, application, writable
 from .runs import run as in_processes
-from .tables import ROOT, Table, fill, machine, markdown, number, read, surroundings
+from .tables import ROOT, fill, machine, markdown, number, read, surroundings
 
 BENCH = "bench"  # the clouds, in the folder that a run is given; beside it a folder of answers for each tool
 TIMED = ("clean", "depth2")  # of the first shape of each family
@@ -36,25 +40,20 @@ KEPT_AFTER = 20  # skeletons, so that little is lost when a run is stopped
 PRELOADED = ("glsk_o3d.pipelines", "glsk_o3d.filters.refiner", "glsk_o3d.io.scans", "glsk_o3d.viewing.preview")
 PRELOADED += ("glsk_bench.scoring", "glsk_bench.making", "glsk_bench.table", "open3d", "typer", "trimesh", "skeletor")
 PRELOADED += ("pc_skeletor", "pygel3d.graph", "compas_cgal.skeletonization", "compas_cgal.meshing", "skan")
+PRELOADED += ("glsk_studies.leaderboard",)  # which each process loads anew otherwise
+TEN = ("animals_100", "blades_100", "mugs_100", "rings_100", "toys_100")  # shapes of which two clouds each are kept
+TEN_VARIANTS = ("depth2", "flying")
 IMAGES = ROOT / "docs" / "images"
-PARTS = {  # of pages, by the version of the benchmark
-    "v1": (
-        *("short", "leaderboard", "losses", "unclear", "topologies", "errors", "families", "failures", "runs"),
-        "recorded",
-    ),
-    "v2": (
-        *("things-short", "things-leaderboard", "things-losses", "things-unclear", "things-topologies"),
-        *("things-errors", "things-hooks", "things-reach", "things-families", "things-families-hooks"),
-        *("things-failures", "things-runs", "things-repeat"),
-    ),
-}
-REPEATED = {"repeat": "things", "repeat-meshes": "meshes"}
-PICTURES = {"v1": "leaderboard", "v2": "leaderboard_things"}
+PARTS = (  # of pages; those of a kind of shapes begin with it
+    *("short", "leaderboard", "losses", "failures", "runs", "recorded", "repeat"),
+    *(f"{kind}-{part}" for kind in board.KINDS for part in ("leaderboard", "losses", "variants", "families")),
+)
+PICTURES = {"things": "leaderboard_things", "tubes": "leaderboard"}
 
 app = application(__doc__)
 Place = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the clouds and of all answers.")]
 Tool = Annotated[str, typer.Option("--tool", metavar="NAMES", help="With commas; else all that are installed.")]
-Version = Annotated[str, typer.Option("--version", metavar="NAME", help="Of the benchmark.")]
+Version = Annotated[str, typer.Option("--version", metavar="NAME", help="Of the benchmark: v3, things, or v1, tubes.")]
 Limit = Annotated[float, typer.Option("--limit", help="Seconds for a skeleton.")]
 
 
@@ -62,17 +61,45 @@ Limit = Annotated[float, typer.Option("--limit", help="Seconds for a skeleton.")
 def run_(
     place: Place,
     tool: Tool = "",
-    limit: Limit = 60.0,
+    limit: Limit = 300.0,
     jobs: Jobs = 2,
-    version: Version = "v1",
-    part: Annotated[bool, typer.Option("--part", help="Take DIR/bench as it is, though it lacks some clouds.")] = False,
+    version: Version = "v3",
 ) -> None:
     """Run tools over the whole benchmark, or go on where it was left, and keep their scores in benchmarks/VERSION."""
-    peers = installed(PEERS, tool)
-    bench = read_folder(place / BENCH) if part else make(place / BENCH, version, jobs=jobs)
+    peers = installed(peers_of(version), tool)
+    bench = make(place / BENCH, version, jobs=jobs)
     for name, made in answered(bench, place, peers, limit, jobs):
-        results = score_answers(bench, place / name, name=name)
-        typer.echo(f"{board.keep_scores(results, made)}: {results.failures} failures")
+        keep_scores(bench, place / name, made)
+
+
+@app.command("keep")
+def keep_(place: Place, tool: Tool = "") -> None:
+    """Keep the scores of what has been run so far, of all shapes that have all their answers."""
+    bench = read_folder(place / BENCH)
+    for name in installed(PEERS, tool):
+        if (place / name / TIMES_NAME).is_file():
+            lacking = {it.shape for it in bench.scored if it.name not in read_times(place / name)}
+            shapes = {shape: told for shape, told in bench.shapes.items() if shape not in lacking}
+            keep_scores(replace(bench, shapes=shapes), place / name, read(place / name / TIMES_NAME)["made"])
+
+
+@app.command("ten")
+def ten_(place: Place, tool: Tool = "cao2010", version: Version = "v3") -> None:
+    """Keep a tool's answers to ten clouds, and all digits of their scores, with which scripts/try_wheel.py compares."""
+    bench, found = read_folder(place / BENCH), {}
+    for each in bench.scored:
+        if each.shape in TEN and each.variant in TEN_VARIANTS:
+            answer = read_skeleton(place / tool / f"{each.name}.npz")
+            vertices, edges = answer.vertices.round(6).tolist(), answer.edges.tolist()
+            scores = score(bench.truth(each.shape), vertices, edges).as_dict()
+            found[each.name] = dict(vertices=vertices, edges=edges, scores=scores)
+    typer.echo(board.keep_ten(version, found))
+
+
+def keep_scores(bench: BenchmarkFolder, answers: Path, made: dict) -> None:
+    """Score a tool's answers, keep that, and say so."""
+    results = score_answers(bench, answers)
+    typer.echo(f"{board.keep_scores(results, made)}: {results.failures} failures of {len(results.rows)} clouds")
 
 
 @app.command("repeat")
@@ -81,14 +108,14 @@ def repeat_(
     meshes: Annotated[Path | None, typer.Argument(metavar="MESHES", help="A folder; else things.")] = None,
     tool: Tool = "",
     draws: Annotated[int, typer.Option("--draws", min=2, help="Clouds of each object.")] = 5,
-    limit: Limit = 60.0,
+    limit: Limit = 300.0,
     jobs: Jobs = 2,
-    version: Version = "v2",
+    version: Version = "v3",
 ) -> None:
     """Run tools over several clouds of each object, and keep how far their answers are apart in benchmarks/VERSION."""
     objects = "things" if meshes is None else "meshes"
-    folder, peers = place / f"repeat_{objects}", installed(PEERS, tool)
-    bench = sample(folder / BENCH, meshes, version=version, draws=draws)
+    folder, peers = place / f"repeat_{objects}", installed(peers_of(version), tool)
+    bench = sample(folder / BENCH, meshes, version=version, draws=draws, double=True)
     for name, made in answered(bench, folder, peers, limit, jobs):
         found = repeat(bench, folder / name, name=name)
         where = board.keep_repeat(version, objects, found, made)
@@ -101,9 +128,13 @@ def answered(
 ) -> Iterator[tuple[str, dict]]:
     """Run tools over all clouds, or go on; gives the name of each, when all are done, and what it was made with."""
     one_thread()
-    for name, peer in peers.items():
-        made, times = begun(place / name, peer, limit)
-        todo = [it for it in bench.scored if it.name not in times]
+    known = {name: begun(place / name, peer, limit) for name, peer in peers.items()}
+    seeds: dict[int, list] = {}  # first those of all tools and families, so that what is stopped can be compared
+    for it in bench.scored:
+        seeds.setdefault(bench.shapes[it.shape].get("seed", 0), []).append(it)
+    for (_, clouds), (name, peer) in product(sorted(seeds.items()), peers.items()):
+        made, times = known[name]
+        todo = [it for it in clouds if it.name not in times]
         for first in range(0, len(todo), KEPT_AFTER):
             some = todo[first : first + KEPT_AFTER]
             work = [(dict(cloud=it.name), (it.path, peer, place / name / f"{it.name}.npz")) for it in some]
@@ -111,7 +142,7 @@ def answered(
                 spent = limit if "not done" in row.get("failure", "") else None
                 times[row["cloud"]] = {"seconds": row.get("seconds", spent), "failure": row.get("failure")}
             write_json(place / name / TIMES_NAME, {"made": made, "clouds": times})
-        yield name, made
+    yield from ((name, made) for name, (made, _) in known.items())
 
 
 def begun(folder: Path, peer: Peer, limit: float) -> tuple[dict, dict]:
@@ -139,33 +170,40 @@ def answer(cloud: Path, peer: Peer, path: Path) -> dict:
 
 
 @app.command("seconds")
-def seconds_(tool: Tool = "", version: Version = "v1") -> None:
-    """CPU seconds of each tool on twelve clouds, one at a time; kept in benchmarks/VERSION. Let the machine be idle."""
-    peers = installed(PEERS, tool)
-    where = machine()
+def seconds_(tool: Tool = "", version: Version = "v3") -> None:
+    """CPU seconds and memory of each tool on the first shapes, kept in benchmarks/VERSION. For an idle Linux."""
+    peers, asked, where = installed(peers_of(version), tool), VERSIONS[version], machine()
+    shapes = [shape(family, asked.seeds[0], steady=asked.steady) for family in asked.families]
+    clouds = [cloud(it, variant) for it in shapes for variant in TIMED if variant in asked.variants_of(it.name)]
     one_thread()
-    rows = in_processes(timed, [(dict(tool=name), (peer, version)) for name, peer in peers.items()], 1, fresh=True)
-    board.keep_seconds(
-        version, {row["tool"]: dict(cpu=round(row["cpu"], 3), where=where) for row in rows if "cpu" in row}
-    )
-    for row in rows:
-        typer.echo(f"{row['tool']}: " + (row["failure"] if "failure" in row else f"{row['cpu']:.2f} s"))
+    for name, peer in peers.items():
+        (row,) = in_processes(timed, [(dict(tool=name), (peer, clouds))], 1, fresh=True, preload=PRELOADED)
+        if "failure" in row:
+            typer.echo(f"{name}: {row['failure']}")
+            continue
+        board.keep_seconds(version, {name: dict(cpu=round(row["cpu"], 3), mb=round(row["mb"]), where=where)})
+        typer.echo(f"{name}: {row['cpu']:.2f} s, {row['mb']:.0f} MB")
 
 
-def timed(peer: Peer, version: str) -> dict:
-    """The median CPU seconds of a tool, after a first call."""
-    asked = VERSIONS[version]
-    shapes = [shape(family, asked.seeds[0]) for family in asked.families]
-    return dict(cpu=median(peer.timed(cloud(it, variant))[1] for it in shapes for variant in TIMED))
+def timed(peer: Peer, clouds: list[np.ndarray]) -> dict:
+    """The median CPU seconds of a tool after a first call, and how many MB all its calls take at most."""
+    before = memory("VmRSS")
+    Path("/proc/self/clear_refs").write_text("5")  # so that VmHWM begins anew
+    spent = [peer.timed(points)[1] for points in clouds]
+    return dict(cpu=median(spent), mb=memory("VmHWM") - before)
+
+
+def memory(fact: str) -> float:
+    """What Linux says of this process [MB]: VmRSS, its memory now, or VmHWM, the most that it had."""
+    return int(re.search(rf"{fact}:\s*(\d+)", Path("/proc/self/status").read_text())[1]) / 1024
 
 
 def parts_of(path: Path) -> list[str]:
     """The tables for which a page has a place."""
     text = path.read_text(encoding="utf-8") if path.is_file() else ""
-    known = [name for names in PARTS.values() for name in names]
-    names = [name for name in known if f"<!-- {name} -->\n" in text]
+    names = [name for name in PARTS if f"<!-- {name} -->\n" in text]
     if not names:
-        raise typer.BadParameter(f"there is no page {path} with a line <!-- NAME -->: {', '.join(known)}")
+        raise typer.BadParameter(f"there is no page {path} with a line <!-- NAME -->: {', '.join(PARTS)}")
     return names
 
 
@@ -173,46 +211,39 @@ def parts_of(path: Path) -> list[str]:
 def page(paths: Annotated[list[Path] | None, typer.Argument(metavar="MD...")] = None) -> None:
     """The tables of what is kept, printed; or put into pages, with pictures in docs/images."""
     places = {path: parts_of(path) for path in paths or ()}
-    found = {}
-    for version in PARTS:
-        entries = kept(version)
-        rows = leaderboard(entry.results for entry in entries).entries if entries else []
-        found |= pieces(version, entries, rows)
-        if rows and places:
-            board.draw_board(rows, IMAGES, PICTURES[version])
+    entries = {kind: found for kind, version in board.KINDS.items() if (found := kept(version))}
+    rows = {kind: board.ranked(here) for kind, here in entries.items()}
+    found = pieces(entries, rows)
     if not places:
         typer.echo("\n".join(found.values()))
     for path, names in places.items():
         fill(path, {name: found[name] for name in names if name in found})
+    for kind in rows if places else ():
+        board.draw_board(rows[kind], IMAGES, PICTURES[kind])
 
 
-def pieces(version: str, entries: list[Entry], rows: list[dict]) -> dict[str, str]:
-    """What stands at the places of the pages, by their names; of what is kept, and its leaderboard's entries."""
-    found: dict[str, Table] = {}
-    if entries:
-        cpu, worse = seconds(version), board.worse(entries)
-        found = {
-            "short": board.short(rows, cpu),
-            "leaderboard": board.overview(rows, cpu),
-            "losses": board.losses(worse),
-            "unclear": board.unclear(worse),
-            "topologies": board.by_group(entries, "variant", "topology", 2, "right topology, by kind of cloud"),
-            "errors": board.by_group(entries, "variant", "error", 3, "error, by kind of cloud"),
-            "hooks": board.by_group(entries, "variant", "hooks", 2, "ends that are hooks, by kind of cloud"),
-            "reach": board.by_group(entries, "variant", "reach", 2, "reach, by kind of cloud"),
-            "families": board.by_group(entries, "family", "topology", 2, "right topology, by family of shapes"),
-            "families-hooks": board.by_group(entries, "family", "hooks", 2, "ends that are hooks, by family"),
-            "failures": board.failures(entries),
-            "runs": board.runs(entries),
-            "recorded": board.recorded(),
+def pieces(entries: Mapping[str, list[Entry]], rows: Mapping[str, list[dict]]) -> dict[str, str]:
+    """What stands at the places of the pages, by their names; of what is kept, and the leaderboards' entries."""
+    spent = {kind: seconds(board.KINDS[kind]) for kind in entries}
+    worse = {kind: board.worse(here) for kind, here in entries.items()}
+    found = {"failures": board.failures(entries), "runs": board.runs(entries), "losses": board.losses(worse)}
+    if entries.keys() == board.KINDS.keys():
+        found["short"] = board.short(rows["things"], rows["tubes"], spent["things"])
+        found["leaderboard"] = board.both(rows["things"], rows["tubes"], spent["things"])
+    for kind, here in entries.items():
+        found |= {
+            f"{kind}-leaderboard": board.overview(rows[kind], spent[kind], kind),
+            f"{kind}-losses": board.all_losses(worse[kind], kind),
+            f"{kind}-variants": board.by_group(here, "variant", kind),
+            f"{kind}-families": board.by_group(here, "family", kind),
         }
-    found |= {name: board.repeated(it) for name, objects in REPEATED.items() if (it := repeats(version, objects))}
-    prefix = "" if version == "v1" else "things-"
-    told = {f"{prefix}{name}": markdown([table]) for name, table in found.items()}
-    if entries:
-        where = {it["where"]: None for it in cpu.values()}
-        told[f"{prefix}leaderboard"] += "".join(f"\nCPU seconds: {it}\n" for it in where)
-    return {name: told[name] for name in PARTS[version] if name in told}
+    if again := repeats(board.KINDS["things"], "things"):
+        found["repeat"] = board.repeated(again)
+    told = {name: markdown([table]) for name, table in found.items()}
+    for kind, each in spent.items():
+        where = dict.fromkeys(it["where"] for it in each.values())
+        told[f"{kind}-leaderboard"] += "".join(f"\nCPU seconds: {it}\n" for it in where)
+    return {**told, "recorded": markdown([board.recorded()])}
 
 
 @app.command()
@@ -221,7 +252,7 @@ def picture(
     path: Annotated[Path, typer.Argument(metavar="PNG", callback=writable)],
     name: Annotated[str, typer.Option("--cloud", help="One of the benchmark.")] = "figures_100_scan2",
     tool: Tool = "default,pygel-points,cgal,pc-skeletor,cgal-poisson,skeletor-wavefront",
-    version: Version = "v1",
+    version: Version = "v3",
 ) -> None:
     """Draw the answers of some tools to one cloud, side by side."""
     entries = {entry.tool: entry for entry in kept(version)}

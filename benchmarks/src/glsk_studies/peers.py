@@ -10,7 +10,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -173,6 +173,7 @@ SURFACES: dict[str, Callable] = {
     "points": np.asarray,
     "wrap": wrap,
     "coarser wrap": partial(wrap, fineness=60.0),
+    "coarsest wrap": partial(wrap, fineness=40.0),
     "Poisson": poisson,
 }
 
@@ -220,7 +221,7 @@ def skeleton_of(vertices: np.ndarray, edges: np.ndarray) -> Skeleton:
 
 
 CGAL, WRAP = ("compas-cgal",), ("cgal", "compas-cgal")
-PEERS = {
+PEERS = {  # of tubes
     **{name: Peer(f"`{name}`", (), "points", partial(ours, name)) for name in ("default", "cao2010", "wen2024")},
     "pc-skeletor": Peer("pc-skeletor", ("pc-skeletor", "mistree", "robust-laplacian"), "points", pc_skeletor),
     "pygel-points": Peer("PyGEL3D", ("PyGEL3D",), "points", separators_of_points),
@@ -234,6 +235,15 @@ PEERS = {
     "thinning": Peer("scikit-image, voxels", ("scikit-image", "skan", *WRAP), "wrap", thinning),
     "thinning-poisson": Peer("scikit-image, voxels", ("scikit-image", "skan"), "Poisson", thinning),
 }
+THINGS = PEERS | {  # stout bodies have many more triangles than tubes of the same size
+    "pygel": replace(PEERS["pygel"], takes="coarsest wrap"),
+    "cgal": replace(PEERS["cgal"], takes="coarser wrap"),
+}
+
+
+def peers_of(version: str) -> dict[str, Peer]:
+    """The tools with the settings that were chosen for the shapes of a version: for tubes, or for things."""
+    return PEERS if version == "v1" else THINGS
 
 
 def installed(known: Mapping[str, Peer], names: str) -> dict[str, Peer]:

@@ -30,7 +30,7 @@ Tables = list[Table]
 Columns = Mapping[str, str | Callable[[dict], Any]]  # by header: a fact of a row, or what makes a cell of it
 # columns that are not numbers, besides the first
 TEXT = {"pipeline", "setting", "takes", "note", "now right", "now wrong", "measure", "to", "why", "which", "failed"}
-TEXT |= {"most in", "packages", "commit", "where"}
+TEXT |= {"most in", "packages", "commit", "where", "interval without 0", "with 0"}
 GREY, ORANGE, BLUE = "#777777", "#d95f02", "#1f4e9c"  # distinct without red and green, and in print
 LOOKS = {"default": dict(color=BLUE, marker="o"), "wen2024": dict(color=ORANGE, marker="^")}
 LOOKS |= {"cao2010": dict(color=GREY, marker="s")}
