@@ -126,10 +126,12 @@ class Refiner(Filter[Skeleton, Skeleton]):
         if asks and _may_be_asked(curve):
             curve, surface, deferred = self._decided(curve, surface.oriented(curve))
         if self.recentre and len(curve.vertices):
-            if not curve.report.on_medial_axis:
+            on_axis = curve.report.on_medial_axis  # where lines of limbs could draw a junction across a hole
+            if not on_axis:
                 curve = fit_axis(level_wide_ends(curve, surface), self.recentre + 1, surface, settle=True)
             size = curve.binary_size  # fourth powers of lengths must not overflow
-            curve = regrow_ends(move_junctions(curve.scaled(1 / size)), self.ends == "surface").scaled(size)
+            curve = curve.scaled(1 / size)
+            curve = regrow_ends(curve if on_axis else move_junctions(curve), self.ends == "surface").scaled(size)
             if _may_be_asked(curve):
                 n_facing, facing = surface.facing(curve)
                 curve = curve.with_facts(n_facing=n_facing, facing=facing)

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from itertools import product
 
+import networkx as nx
 import numpy as np
 import pytest
 from scipy.spatial.distance import cdist
@@ -139,6 +140,40 @@ def test_where_contraction_shuts_a_hole_the_graph_is_on_the_medial_axis(assert_s
     assert refined.n_loops == 3 > Refiner()(shut).n_loops
     assert refined.report.decisions == ()  # the solid has answered
     assert Refiner(handle=1)(opened).n_loops == 0
+
+
+def block(centres, seed, n=8192, noise=0.05):
+    """A block of 80 x 24 x 20 with round holes of radius 3 along z."""
+    rng = np.random.default_rng(seed)
+    half = np.array([40.0, 12.0, 10.0])
+    areas = np.append(8 * half.prod() / half, len(centres) * 2 * np.pi * 3 * 20)
+    kind = rng.choice(4, 2 * n, p=areas / areas.sum())
+    points = rng.uniform(-half, half, (2 * n, 3))
+    faces, walls = np.flatnonzero(kind < 3), kind == 3
+    points[faces, kind[faces]] = rng.choice([-1, 1], len(faces)) * half[kind[faces]]
+    angle = rng.uniform(0, 2 * np.pi, walls.sum())
+    points[walls, :2] = 3 * np.column_stack([np.cos(angle), np.sin(angle)])
+    points[walls, 0] += rng.choice(centres, len(angle))
+    in_hole = (kind == 2) & (np.hypot(points[:, :1] - centres, points[:, 1:2]) < 3).any(axis=1)
+    return points[~in_hole][:n] + noise * rng.standard_normal((n, 3))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [11, 34, 39, 47])  # a junction that limbs place lies across a hole
+def test_refined_loops_go_round_the_holes_of_their_solid(seed):
+    """The turns of independent loops around three holes are independent, too."""
+    centres = np.array([-24.0, 0.0, 24.0])
+    opened = Connector()((pipelines.rings() | Contractor())(block(centres, seed)))
+    assert opened.report.on_medial_axis
+    refined = Refiner()(opened)
+    graph = nx.Graph(refined.edges.tolist())
+    tree = nx.minimum_spanning_tree(graph)
+    turns = []
+    for a, b in graph.edges - tree.edges:
+        x, y, _ = refined.vertices[[*nx.shortest_path(tree, a, b), a]].T
+        angles = np.unwrap(np.arctan2(y, x - centres[:, None]), axis=1)
+        turns.append(np.rint((angles[:, -1] - angles[:, 0]) / (2 * np.pi)))
+    assert np.linalg.matrix_rank(turns) == refined.n_loops == 3
 
 
 def test_tubes_and_scans_are_not_asked_for_their_solid():
