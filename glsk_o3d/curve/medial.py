@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,6 +36,7 @@ class ClosedNumbers:
 
 
 CLOSED = ClosedNumbers()
+CELL_SIZES = (1.0, 1.4, 0.7)  # measured: of a reconstruction, in those of the first
 
 
 class MedialGraph(NamedTuple):
@@ -44,6 +46,11 @@ class MedialGraph(NamedTuple):
     radii: np.ndarray  # (p,) of the inscribed balls
     edges: np.ndarray  # (e, 2)
     genus: int  # of the surface: handles of the solid
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether it has as many loops as the surface has handles."""
+        return self.n_loops == self.genus
 
     @property
     def n_loops(self) -> int:
@@ -61,15 +68,24 @@ class MedialGraph(NamedTuple):
     def of(cls, points: np.ndarray, outward: np.ndarray) -> MedialGraph:
         """That of the closed surface through points (n, 3); the largest ball where the axis burns down to one place.
 
-        InvalidCloudError where no surface goes through the points.
+        Where it has other loops than the surface, as tetrahedra cross that at sharp edges, a coarser and a finer one is
+        tried. InvalidCloudError where no surface goes through the points.
         """
-        mesh = poisson_mesh(points, outward, spacing(points))
+        first, *others = (partial(poisson_mesh, points, outward, cell * spacing(points)) for cell in CELL_SIZES)
+        graph = cls._of(first())
+        while others and not graph.is_sound:
+            other = cls._of(others.pop(0)())
+            graph = other if other.is_sound else graph
+        return graph
+
+    @classmethod
+    def _of(cls, mesh: Any) -> MedialGraph:
         vertices, triangles = np.asarray(mesh.vertices), np.asarray(mesh.triangles)
         axis = MedialAxis.of(vertices, inside_of(mesh))
         if len(axis.places) == 0:
-            raise InvalidCloudError(f"the surface through {len(points)} points has no inside")
+            raise InvalidCloudError(f"a surface with {len(vertices)} vertices has no inside")
         if (burnt := Burnt.of(axis)).has_sheets:
-            raise InvalidCloudError(f"the solid of {len(points)} points has a cavity: sheets around it are no curve")
+            raise InvalidCloudError("the solid has a cavity: sheets around it are no curve")
         curve = medial_curve(axis, burnt, vertices)
         used, edges = np.unique(curve, return_inverse=True)
         if len(curve) == 0:
@@ -95,10 +111,13 @@ class OrientedSurface:
         points, rings = state.cloud[state.survivors], state.rings
         outward = outward_normals(points, state.normals[state.survivors], rings)
         areas = point_areas(points, nearest_neighbours(points, min(AREA_NEIGHBOURS + 1, len(points)))[1])
-        faces, count = (dot(points - state.positions, outward) < 0)[:, None].astype(float), rings.sizes[:, None]
+        piece = component_labels(len(points), np.column_stack([rings.centres, rings.indices]))
+        facing = dot(points - state.positions, outward) < 0
+        is_inward = np.bincount(piece, areas * facing) > CURVE.majority * np.bincount(piece, areas)
+        outward, facing = np.where(is_inward[piece, None], -outward, outward), facing ^ is_inward[piece]
+        faces, count = facing[:, None].astype(float), rings.sizes[:, None]
         for _ in range(2):  # in patches: noise turns some here and there
             faces = (faces + count * rings.mean_over(faces)) / (1 + count)
-        piece = component_labels(len(points), np.column_stack([rings.centres, rings.indices]))
         cosine = dot(outward[rings.centres], outward[rings.indices])
         flat = np.abs(cosine) * uprightness(points, outward, rings.centres, rings.indices)
         shut = float(areas[faces[:, 0] > CURVE.majority].sum() / areas.sum())

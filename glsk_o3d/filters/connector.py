@@ -114,8 +114,7 @@ class Connector(Filter[Contraction, Skeleton]):
         mean = group_sum(np.column_stack([curve.places, curve.radii]), part, part.max() + 1)
         mean /= np.bincount(part)[:, None]
         vertex_of_row = part[cKDTree(curve.places).query(state.cloud)[1]]
-        is_sound = curve.n_loops == curve.genus  # where tetrahedra cross the surface there are false loops
-        graph = raw_graph(state, mean[:, :3], edges, vertex_of_row, mean[:, 3], on_medial_axis=is_sound)
+        graph = raw_graph(state, mean[:, :3], edges, vertex_of_row, mean[:, 3], on_medial_axis=curve.is_sound)
         return graph if graph.n_loops or not self.shut else contracted
 
     def _edges(self, state: Contraction, vertex_of_survivor: np.ndarray) -> np.ndarray:

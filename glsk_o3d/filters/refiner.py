@@ -127,7 +127,9 @@ class Refiner(Filter[Skeleton, Skeleton]):
             curve, surface, deferred = self._decided(curve, surface.oriented(curve))
         if self.recentre and len(curve.vertices):
             on_axis = curve.report.on_medial_axis  # where lines of limbs could draw a junction across a hole
-            if not on_axis:
+            if on_axis:  # it is measured where it is
+                curve = fit_axis(curve, 0)
+            else:
                 curve = fit_axis(level_wide_ends(curve, surface), self.recentre + 1, surface, settle=True)
             size = curve.binary_size  # fourth powers of lengths must not overflow
             curve = curve.scaled(1 / size)

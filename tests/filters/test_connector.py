@@ -139,6 +139,8 @@ def test_where_contraction_shuts_a_hole_the_graph_is_on_the_medial_axis(assert_s
     refined = Refiner()(opened)
     assert refined.n_loops == 3 > Refiner()(shut).n_loops
     assert refined.report.decisions == ()  # the solid has answered
+    assert (refined.confidence > 0.3).all()
+    assert refined.verdict == "good"
     assert Refiner(handle=1)(opened).n_loops == 0
 
 
