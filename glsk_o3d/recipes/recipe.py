@@ -142,7 +142,7 @@ def from_recipe(recipe: dict[str, Any]) -> Pipeline[Any, Any]:
     Examples
     --------
     >>> from_recipe({"glsk_o3d": {"version": 1}, "pipeline": [{"filter": "Connector", "radius": "2%"}]})
-    Connector(radius='2%', thickness=0.6, links='all')
+    Connector(radius='2%', thickness=0.6, links='all', shut=0.01)
     """
     _check_head(recipe)
     stages = recipe["pipeline"]

@@ -38,7 +38,7 @@ def test_the_bones_of_a_limb_do_not_move_one_beside_it():
     vertex = np.repeat(np.arange(n), 16)
     edges, none = np.column_stack([np.arange(n - 1), np.arange(1, n)]), np.zeros_like(points)
     skeleton = Skeleton(curve, edges, np.full(n, 0.2), vertex, points, none)
-    bones = armature(skeleton, 7)
+    bones = armature(skeleton, 5)
     of_bone = np.sign(bones.vertices[bones.edges].mean(axis=1)[:, 0])
     high = points[:, 2] > 1.0
     foreign = {}

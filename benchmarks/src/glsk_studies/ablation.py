@@ -28,6 +28,7 @@ IDEAS = {
     "runaways held": "Contractor.retries=0",
     "sampling by thickness": "Connector.radius=2% Connector.thickness=0",
     "all ring links": "Connector.links=nearest",
+    "shut holes reopened": "Connector.shut=1",
     "shortest edge first": "Refiner.collapse=degree",
     "false loops closed": "Refiner.handle=0",
     "air cut": "Refiner.air=0",
