@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -71,12 +70,10 @@ class MedialGraph(NamedTuple):
         Where it has other loops than the surface, as tetrahedra cross that at sharp edges, a coarser and a finer one is
         tried. InvalidCloudError where no surface goes through the points.
         """
-        first, *others = (partial(poisson_mesh, points, outward, cell * spacing(points)) for cell in CELL_SIZES)
-        graph = cls._of(first())
-        while others and not graph.is_sound:
-            other = cls._of(others.pop(0)())
-            graph = other if other.is_sound else graph
-        return graph
+        apart = spacing(points)
+        graphs = (cls._of(poisson_mesh(points, outward, cell * apart)) for cell in CELL_SIZES)
+        first = next(graphs)
+        return first if first.is_sound else next((other for other in graphs if other.is_sound), first)
 
     @classmethod
     def _of(cls, mesh: Any) -> MedialGraph:
