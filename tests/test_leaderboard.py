@@ -199,6 +199,23 @@ class TestCommands:
         assert not found.results.whole
         assert found.made == dict(commit="c", hours=0.03)
 
+    def test_shapes_with_kept_scores_are_not_run_again(self, call, small, tmp_path, monkeypatch):
+        monkeypatch.setattr(leaderboard, "make", lambda place, version, jobs: read_folder(place))
+        monkeypatch.setattr(board, "KEPT", tmp_path)
+        peer = leaderboard.Peer("thing", ("numpy",), "points", leaderboard.PEERS["wen2024"].make)
+        monkeypatch.setattr(leaderboard, "peers_of", lambda version: dict(thing=peer))
+        monkeypatch.setattr(board, "PEERS", dict(thing=peer))
+        before = row("tubes_100", error=7.0)
+        for limit, known in ((300.0, [7.0, 7.0]), (200.0, [])):  # of another limit they are not comparable
+            made = dict(packages=peer.versions(), limit=limit)
+            rows = [before, before | dict(variant="scan2")]
+            board.keep_scores(Results("v1", "thing", False, rows), made)
+            call("run", tmp_path, "--tool", "thing", "--jobs", 2)
+            (found,) = board.kept("v1")
+            assert [it["error"] for it in found.results.rows if it["error"] == 7.0] == known
+            assert len({(it["shape"], it["variant"]) for it in found.results.rows}) == len(found.results.rows) == 7
+            assert (tmp_path / "thing" / "tubes_100_clean.npz").exists() == (not known)
+
     def test_shapes_come_by_their_seeds_so_that_a_part_has_all_families(self, small, tmp_path, monkeypatch):
         asked = []
         monkeypatch.setattr(leaderboard, "KEPT_AFTER", 1)

@@ -10,13 +10,14 @@ import time
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import product
+from operator import itemgetter
 from pathlib import Path
 from statistics import median
 from typing import Annotated
 
 import numpy as np
 import typer
-from glsk_bench import BenchmarkFolder, make, read_folder, repeat, sample, score, score_answers
+from glsk_bench import BenchmarkFolder, Results, make, read_folder, repeat, sample, score, score_answers
 from glsk_bench.clouds import cloud
 from glsk_bench.scoring import TIMES_NAME, read_times
 from glsk_bench.shapes import shape
@@ -65,22 +66,20 @@ def run_(
     jobs: Jobs = 2,
     version: Version = "v3",
 ) -> None:
-    """Run tools over the whole benchmark, or go on where it was left, and keep their scores in benchmarks/VERSION."""
+    """Run tools over all shapes of which benchmarks/VERSION has no scores of the same making, or go on; keep those."""
     peers = installed(peers_of(version), tool)
     bench = make(place / BENCH, version, jobs=jobs)
-    for name, made in answered(bench, place, peers, limit, jobs):
-        keep_scores(bench, place / name, made)
+    for name, made in answered(bench, place, peers, limit, jobs, anew=False):
+        keep_scores(bench, place / name, peers[name], made)
 
 
 @app.command("keep")
 def keep_(place: Place, tool: Tool = "") -> None:
     """Keep the scores of what has been run so far, of all shapes that have all their answers."""
     bench = read_folder(place / BENCH)
-    for name in installed(PEERS, tool):
+    for name, peer in installed(PEERS, tool).items():
         if (place / name / TIMES_NAME).is_file():
-            lacking = {it.shape for it in bench.scored if it.name not in read_times(place / name)}
-            shapes = {shape: told for shape, told in bench.shapes.items() if shape not in lacking}
-            keep_scores(replace(bench, shapes=shapes), place / name, read(place / name / TIMES_NAME)["made"])
+            keep_scores(bench, place / name, peer, read(place / name / TIMES_NAME)["made"])
 
 
 @app.command("ten")
@@ -96,9 +95,15 @@ def ten_(place: Place, tool: Tool = "cao2010", version: Version = "v3") -> None:
     typer.echo(board.keep_ten(version, found))
 
 
-def keep_scores(bench: BenchmarkFolder, answers: Path, made: dict) -> None:
-    """Score a tool's answers, keep that, and say so."""
-    results = score_answers(bench, answers)
+def keep_scores(bench: BenchmarkFolder, answers: Path, peer: Peer, made: dict) -> None:
+    """Score a tool's answers to whole shapes, keep that beside what is kept of the other shapes, and say so."""
+    times = read_times(answers)
+    lacking = {it.shape for it in bench.scored if it.name not in times}
+    there = replace(bench, shapes={shape: told for shape, told in bench.shapes.items() if shape not in lacking})
+    before = [row for row in rows_kept(bench.version, answers.name, peer, made) if row["shape"] in lacking]
+    rows = before + (score_answers(there, answers).rows if there.shapes else [])
+    whole = bench.whole and lacking == {row["shape"] for row in before}
+    results = Results(bench.name, answers.name, whole, sorted(rows, key=itemgetter("shape")))
     typer.echo(f"{board.keep_scores(results, made)}: {results.failures} failures of {len(results.rows)} clouds")
 
 
@@ -124,17 +129,24 @@ def repeat_(
 
 
 def answered(
-    bench: BenchmarkFolder, place: Path, peers: Mapping[str, Peer], limit: float, jobs: int
+    bench: BenchmarkFolder, place: Path, peers: Mapping[str, Peer], limit: float, jobs: int, anew: bool = True
 ) -> Iterator[tuple[str, dict]]:
-    """Run tools over all clouds, or go on; gives the name of each, when all are done, and what it was made with."""
+    """Run tools over all clouds, or go on; gives the name of each, when all are done, and what it was made with.
+
+    Not `anew`: shapes of which scores are kept are left out.
+    """
     one_thread()
     known = {name: begun(place / name, peer, limit) for name, peer in peers.items()}
+    scored = {
+        name: {row["shape"] for row in rows_kept(bench.version, name, peer, known[name][0])} if not anew else set()
+        for name, peer in peers.items()
+    }
     seeds: dict[int, list] = {}  # first those of all tools and families, so that what is stopped can be compared
     for it in bench.scored:
         seeds.setdefault(bench.shapes[it.shape].get("seed", 0), []).append(it)
     for (_, clouds), (name, peer) in product(sorted(seeds.items()), peers.items()):
         made, times = known[name]
-        todo = [it for it in clouds if it.name not in times]
+        todo = [it for it in clouds if it.name not in times and it.shape not in scored[name]]
         for first in range(0, len(todo), KEPT_AFTER):
             some = todo[first : first + KEPT_AFTER]
             work = [(dict(cloud=it.name), (it.path, peer, place / name / f"{it.name}.npz")) for it in some]
@@ -152,10 +164,20 @@ def begun(folder: Path, peer: Peer, limit: float) -> tuple[dict, dict]:
     if not (folder / TIMES_NAME).is_file():
         return made, {}
     before = read(folder / TIMES_NAME)["made"]
-    same = ("packages", "limit") if peer.packages else ("commit", "limit")
-    if other := [f"{before[it]}" for it in same if before[it] != made[it]]:
+    if other := [f"{before[it]}" for it in making(peer) if before[it] != made[it]]:
         raise typer.BadParameter(f"{folder} has answers of {', '.join(other)}: remove it, or give another folder")
     return before, read_times(folder)
+
+
+def making(peer: Peer) -> tuple[str, str]:
+    """What answers of a tool must have been made with alike to stand in one table."""
+    return ("packages", "limit") if peer.packages else ("commit", "limit")
+
+
+def rows_kept(version: str, name: str, peer: Peer, made: dict) -> list[dict]:
+    """The scores in benchmarks/VERSION of a tool's answers, if they were made alike."""
+    told = board.read_kept(version, f"{name}.json.gz")
+    return told["clouds"] if told and all(told["made"][it] == made.get(it) for it in making(peer)) else []
 
 
 def answer(cloud: Path, peer: Peer, path: Path) -> dict:
