@@ -212,7 +212,7 @@ def _is_accepted(skeleton: Skeleton, accept: Verdict | str) -> bool:
     verdict = skeleton.verdict
     if verdict >= accept:
         return True
-    reason = "; ".join(it.text for it in skeleton.report.reasons if CODES[it.code] == verdict)
+    reason = "; ".join(it.text for it in skeleton.reasons if CODES[it.code] == verdict)
     advice = f"accept={verdict.value!r} takes it all the same"
     warnings.warn(f"{verdict.value} ({reason}): {advice}", SkeletonWarning, stacklevel=outside())
     return False

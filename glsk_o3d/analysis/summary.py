@@ -42,6 +42,7 @@ def summary(skeleton: Skeleton, seconds: float) -> dict[str, Any]:
         **({"samples": report.n_draws, "agreeing": report.n_agreeing} if report.n_draws else {}),
         "verdict": skeleton.verdict.value,
         "score": None if np.isnan(skeleton.score) else round(skeleton.score, 3),
+        "reasons": list(map(str, skeleton.reasons)),
         "iterations": len(report.iterations),
         "converged": report.converged,
         "stop_reason": report.stop_reason,

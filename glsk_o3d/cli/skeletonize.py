@@ -121,6 +121,7 @@ def _shown(facts: Mapping[str, Any], skeleton: Skeleton) -> dict[str, Any]:
     hidden |= {"sampled"} if not report.is_sampled else set()
     hidden |= {"contracted"} if facts["contracted"] == facts["distinct"] else set()
     shown = {name: value for name, value in facts.items() if name not in hidden and (name in graph or value)}
+    shown["reasons"] = [text for text in facts["reasons"] if text not in report.warnings]  # those are on stderr
     shown["uncertain"] = [f"{call}; if that is wrong: --set {call.otherwise}" for call in report.uncertain]
     if report.n_draws:
         agreeing = f"{report.n_agreeing} of {report.n_draws} have the same graph"

@@ -84,6 +84,7 @@ def _page(skeleton: Skeleton, title: str, facts: Mapping[str, Mapping[str, str]]
     shown = thinned(skeleton.points, MOST_DRAWN_POINTS)
     finite = np.isfinite(skeleton.points).all(axis=1).sum()
     report, kind = skeleton.report, "Curve skeleton" if len(skeleton.vertices) else "Point cloud"
+    reasons = skeleton.reasons if len(skeleton.vertices) else report.reasons  # a cloud has no verdict
     date = datetime.now(timezone.utc).strftime("%d %B %Y, %H:%M UTC")
     more = [_section(heading, _table((), list(rows.items()))) for heading, rows in facts.items()]
     assets = files(__package__) / "assets"
@@ -96,7 +97,7 @@ def _page(skeleton: Skeleton, title: str, facts: Mapping[str, Mapping[str, str]]
             markup("<div><dt>{}</dt><dd>{}</dd></div>", *item)
             for item in {**counts(skeleton), **verdict(skeleton)}.items()
         ],
-        warnings=warnings([*report.warnings, *(measures.doubts if measures else ())]),
+        warnings=warnings([*map(str, reasons), *(measures.doubts if measures else ())]),
         view=Markup(_view(skeleton, skeleton.points[shown])),
         thinning=f"The view shows {len(shown):,} of {finite:,} points." if len(shown) < finite else "",
         sections=[*more, tree(measures), contraction(report), topology(report), support(report), origin(report)],

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from glsk_o3d import InvalidCloudError, InvalidParameterError, Skeleton, SkeletonWarning, samples
+from glsk_o3d import Decision, InvalidCloudError, InvalidParameterError, Skeleton, SkeletonWarning, samples
 from glsk_o3d.analysis import Gripper, grasp_candidates, grasps
 
 HAND = Gripper(0.4, finger=(0.05, 0.06, 0.3), palm=(0.5, 0.1, 0.2), reach=0.05)
@@ -318,5 +318,9 @@ def test_no_curve_skeleton_has_no_grasps_unless_it_is_accepted():
     with pytest.warns(SkeletonWarning, match="no curve skeleton.*this is a sheet.*accept"):
         assert len(grasp(sheet_like)) == 0
     assert len(grasp(sheet_like, accept="no curve skeleton")) == len(grasp(skeleton))
+    calls = tuple(Decision(about, (0.0, 0.0, 0.0), 0.5, changed=False) for about in ("loop", "limb"))
+    unsure = rod().with_facts(decisions=calls)
+    with pytest.warns(SkeletonWarning, match=r"doubtful \(low score: .*accept"):
+        assert len(grasp(unsure, accept="good")) == 0
     with pytest.raises(InvalidParameterError, match="accept"):
         grasp(skeleton, accept="any")

@@ -72,6 +72,16 @@ def test_warnings_json_and_quiet(invoke, scans, tmp_path):
     assert (tmp_path / "s.ply").is_file()
 
 
+def test_a_doubtful_verdict_is_printed_with_its_reasons(invoke, scans, tmp_path, monkeypatch):
+    monkeypatch.setattr("glsk_o3d.data.verdict.GOOD_SCORE", 1.0)
+    words = ("skeletonize", scans / "ring.ply", "-o", "s.ply")
+    (reason,) = json.loads(invoke(*words, "--json", "--report", "r.html").stdout)["reasons"]
+    assert reason.startswith("low score")
+    assert f"<li>{reason}</li>" in (tmp_path / "r.html").read_text("utf-8")
+    assert re.search(rf"^reasons +{re.escape(reason)}$", invoke(*words).stdout, re.MULTILINE)
+    assert "sphere-like" not in invoke("skeletonize", scans / "ball.ply", "-o", "s.ply").stdout  # it is on stderr
+
+
 # ------------------------------------------------------------------------------------------------ results as recipes
 
 
