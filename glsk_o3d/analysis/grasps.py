@@ -31,7 +31,7 @@ WALL_POINTS = 16  # fitted: neighbours among outliers that show whether they for
 WALL_FLATNESS = 0.01  # fitted: third over first principal spread of outliers that form a wall
 TURNS_PER_STEP = 2  # fitted: directions per approach direction, one of which is across the thin side of a flat part
 FLAT_PART = 0.9  # fitted: width across the thin side of a flat part, over that in the usual directions
-BEYOND = "places beyond the budget"
+UNSEARCHED = "places not searched"
 UNLIKELY_OPENING = 20.0  # derived: openings over diagonals: above those of hands and screws, below those of mm and m
 
 
@@ -139,7 +139,7 @@ def grasp_candidates(
     _check_units(gripper, middle)
     accepted = _is_accepted(skeleton, accept)
     skeleton = skeleton if accepted else replace(skeleton, edges=np.empty((0, 2), int))
-    place, branch, approaches, left_out, examined = _graspable_places(
+    place, branch, approaches, rejected, n_places = _graspable_places(
         skeleton, gripper, clearance, around, spacing, min_confidence, start + SECTIONS_SHARE * budget
     )
     sections = approaches.sections
@@ -149,7 +149,7 @@ def grasp_candidates(
     distance = float(np.linalg.norm(np.ptp(middle, axis=0)))
     surface = surface_around(approaches.position, points, gripper, clearance, distance)
     around_it = (surface, plane, middle, gripper, clearance)
-    opening, depth, seen, blocked = _searched(approaches, ranked, around_it, start + budget)
+    opening, depth, seen, left_out = _searched(approaches, ranked, around_it, start + budget, rejected)
     free = np.flatnonzero(np.isfinite(opening))
     if len(points):
         quality = quality * seen / 3
@@ -171,23 +171,24 @@ def grasp_candidates(
         quality=quality.ravel()[free],
         seen=seen.ravel()[free],
         gripper=gripper,
-        places=examined,
-        left_out=dict(Counter(left_out) + blocked),
+        places=n_places - left_out[UNSEARCHED],
+        left_out=dict(left_out),
     )
     if len(candidates) == 0 and accepted:
         reason = in_words(candidates.left_out) or "the skeleton has no branch"
-        warnings.warn(f"no grasp at {examined} places: {reason}", SkeletonWarning, stacklevel=outside())
+        warnings.warn(f"no grasp at {candidates.places} places: {reason}", SkeletonWarning, stacklevel=outside())
     return candidates
 
 
 def _searched(
-    approaches: Approaches, ranked: np.ndarray, around_it: tuple[Any, ...], stop: float
+    approaches: Approaches, ranked: np.ndarray, around_it: tuple[Any, ...], stop: float, rejected: dict[str, int]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, Counter[str]]:
     """Opening, depth and number of seen sides of approaches, by a check of places in their rank until a time.
 
     `around_it` is what `check_approaches` takes further.
 
-    The opening is NaN of those that are not free. The obstacles are counted, and so are the places not searched.
+    The opening is NaN of those that are not free. The obstacles are counted, and so are the places not searched, with
+    those `rejected` before.
     """
     shape = approaches.approach.shape[:2]
     opening, depth, seen = np.full(shape, np.nan), np.zeros(shape), np.zeros(shape, int)
@@ -196,8 +197,8 @@ def _searched(
         obstacles, opening[row], depth[row], seen[row] = check_approaches(approaches.of([row]), *around_it)
         blocked.update(_remaining(obstacles)[1])
         unsearched -= 1
-    blocked[BEYOND] = unsearched
-    return opening, depth, seen, blocked
+    blocked[UNSEARCHED] = unsearched
+    return opening, depth, seen, Counter(rejected) + blocked
 
 
 def _check_units(gripper: Gripper, middle: np.ndarray) -> None:
@@ -247,7 +248,7 @@ def _graspable_places(
     approaches = Approaches(place[:, :3], place[:, 3:6], approach[every], closing[every], sections.of(every))
     width = approaches.sections.width.min(axis=1)
     reasons = {
-        BEYOND: ~is_examined,
+        UNSEARCHED: ~is_examined,
         "unknown radius": np.isnan(width),
         "too wide": width + clearance > gripper.max_opening,
         "uncertain": ~(confidence >= min_confidence) if min_confidence > 0 else np.zeros(len(width), bool),

@@ -107,7 +107,7 @@ class GraspCandidates(Rows, row="grasp"):
     gripper : Gripper
         The gripper of the candidates.
     places : int
-        Number of examined places along the skeleton.
+        Number of places along the skeleton that were searched: all, unless a budget ended it.
     left_out : dict of str to int
         Numbers of rejected places, and of rejected approaches to the others, by the first reason.
     """

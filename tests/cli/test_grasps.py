@@ -9,7 +9,7 @@ import pytest
 from glsk_o3d import Skeleton, read_skeleton, samples, save_skeleton
 from glsk_o3d.analysis import Gripper, grasp_candidates
 
-BEYOND = "places beyond the budget"
+UNSEARCHED = "places not searched"
 
 
 @pytest.fixture
@@ -59,9 +59,11 @@ def test_the_budget_and_the_verdict_are_those_of_python(invoke, tmp_path, rod):
     skeleton = read_skeleton(tmp_path / rod)
     words = ("grasps", rod, "--opening", 0.4, "--json")
     few = json.loads(invoke(*words, "--max-places", 3).stdout)
-    assert (few["found"], few["left_out"]) == (len(grasp_candidates(skeleton, 0.4, max_places=3)), {BEYOND: 7})
+    assert (few["found"], few["left_out"]) == (len(grasp_candidates(skeleton, 0.4, max_places=3)), {UNSEARCHED: 7})
+    lines = invoke(*words[:-1], "--max-places", 3).stdout.splitlines()
+    assert (lines[0][:21], lines[1]) == ("36 grasps at 3 places", "left out: 7 places not searched")
     first = json.loads(invoke(*words, "--seconds", 0).stdout)
-    assert (first["found"], first["left_out"]) == (12, {BEYOND: 9})
+    assert (first["found"], first["left_out"]) == (12, {UNSEARCHED: 9})
     assert json.loads(invoke(*words, "--seconds", 1e3).stdout)["found"] == 120
 
     flat = skeleton.with_report(skeleton.report.with_reason("sheet", "this is a sheet"))

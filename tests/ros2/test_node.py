@@ -106,7 +106,8 @@ def test_grasps_have_a_budget(ros, cloud, expected, rows, budget):
     node.on_cloud(cloud)
     grasps = grasp_candidates(expected, 0.6, **budget)
     assert 0 < len(grasps) < len(grasp_candidates(expected, 0.6))
-    assert grasps.left_out["places beyond the budget"] == grasps.places - budget.get("max_places", 1)
+    assert grasps.places == budget.get("max_places", 1)
+    assert grasps.left_out["places not searched"] > 0
     np.testing.assert_array_equal(rows(pose.position for pose in node.published[1][1].poses), grasps.position)
 
 
