@@ -47,12 +47,12 @@ class Assessment:
         Share of the length from which the cross-section is seen in more than a third of all directions.
     topology : float
         min(components, clusters) / max(components, clusters), times the share of the loops that open wider than their
-        tube (1 without loops).
+        tube; 1 without loops, and on a medial axis, ``report.on_medial_axis``, whose loops are those of the solid.
     components, clusters : int
         Connected parts of the skeleton, and of the cloud when every point is joined to its 15 nearest.
     loops, wide_loops : int
         Loops of a minimum cycle basis of the skeleton; those that open wider than their tube: the largest circle inside
-        has a larger radius than the median of the nearest cross-sections.
+        has a larger radius than the median of the nearest cross-sections. Around a narrow hole it may be smaller.
     """
 
     centredness: float
@@ -70,7 +70,7 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
     Parameters
     ----------
     skeleton : Skeleton
-        Only `vertices` and `edges` count.
+        Only `vertices`, `edges` and ``report.on_medial_axis`` count.
     points : cloud
         Anything with points, in the units of the skeleton. Points that are not finite are ignored.
 
@@ -120,12 +120,13 @@ def assess(skeleton: Skeleton, points: Any) -> Assessment:
     radius = radii[cKDTree(sections.places[occupied]).query(skeleton.vertices)[1]]
     cycles = minimum_cycle_basis(len(skeleton.vertices), skeleton.edges, skeleton.edge_lengths)
     wide = sum(inscribed_circle(skeleton.vertices[cycle])[1] > np.median(radius[cycle]) for cycle in cycles)
+    sound = wide / len(cycles) if cycles and not skeleton.report.on_medial_axis else 1
     components = skeleton.n_components
     agreement = min(components, clusters) / max(components, clusters)
     return Assessment(
         centredness=float(np.average(centred, weights=sections.lengths[occupied])),
         boundedness=float(np.average(bounded[counted], weights=sections.lengths[counted])),
-        topology=float(agreement * (wide / len(cycles) if cycles else 1)),
+        topology=float(agreement * sound),
         components=components,
         clusters=clusters,
         loops=len(cycles),

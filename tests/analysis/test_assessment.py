@@ -67,6 +67,14 @@ def test_false_loops_open_less_than_their_tube(pipe, curve):
     assert (assessment.loops, assessment.wide_loops, assessment.topology) == (1, 0, 0)
 
 
+def test_narrow_loops_on_the_medial_axis_are_those_of_the_solid(axis_of):
+    ring = torus(4000, ring_radius=0.4, radius=0.37)
+    inner = axis_of(ring, scale=0.9)
+    for on_medial_axis in (False, True):
+        assessment = assess(inner.with_facts(on_medial_axis=on_medial_axis), ring.points)
+        assert (assessment.loops, assessment.wide_loops, assessment.topology) == (1, 0, on_medial_axis)
+
+
 def test_assessments_have_no_unit(axis_of):
     sample, scale = sample_object(1000), 1e6
     axis = axis_of(sample)
