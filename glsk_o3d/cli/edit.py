@@ -113,4 +113,5 @@ def rig(
         except FileFormatError:
             surface = read_cloud(mesh)  # knows best what else may be wrong with the file
     bones = save_rig(curve, output, surface, joints=joints, symmetric=symmetric, cut_loops=cut_loops, root=root, up=up)
-    print_result({}, lambda: echo(f"{len(bones.edges)} bones"), {output: ""})
+    n = len(bones.edges)
+    print_result({"bones": n}, lambda: echo(f"{n} bones"), {output: ""})

@@ -104,6 +104,8 @@ def test_a_mesh_or_a_cloud_hangs_on_the_bones(invoke, tmp_path, y, ending):
     bones = save_rig(read_skeleton(tmp_path / y), tmp_path / "expected.glb", surface, root=(0, 0, -0.5), up="y")
     assert result.stdout == f"{len(bones.edges)} bones\nwrote r.glb\n"
     assert (tmp_path / "r.glb").read_bytes() == (tmp_path / "expected.glb").read_bytes()
+    facts = json.loads(invoke("rig", y, "-o", "r.glb", "--json").stdout)
+    assert facts == {"bones": len(bones.edges), "files": ["r.glb"]}
     few = invoke("rig", y, file, "-o", "few.glb", "--joints", 4, "--symmetric")
     save_rig(read_skeleton(tmp_path / y), tmp_path / "expected.glb", surface, joints=4, symmetric=True)
     assert few.stdout == "3 bones\nwrote few.glb\n"
