@@ -5,7 +5,7 @@ import numpy as np
 from ..curve.merging import merge_into
 from ..data.skeleton import Skeleton
 from ..geometry.groups import group_rank
-from ..geometry.vectors import TINY, Floats, norm
+from ..geometry.vectors import AXES, TINY, Floats, norm
 from .mirror import Plane, mirrored_branches
 
 LOW = 0.25  # fitted: of the height, up to which the feet reach
@@ -53,6 +53,17 @@ def bone_names(bones: Skeleton, plane: Plane | None = None, up: str = "z", sides
     named_bones = [of_vertex[end] for end in fork[ends].tolist()]
     numbers = group_rank(np.unique(named_bones, axis=0, return_inverse=True)[1].reshape(-1), len(named_bones))
     return [f"{label}.{number:03d}{side}" for (label, side), number in zip(named_bones, numbers.tolist(), strict=True)]
+
+
+def axes_of_body(bones: Skeleton, plane: Plane) -> list[str]:
+    """Which of `AXES`, pointing up, make a body with two pairs of limbs of it."""
+    found = []
+    for axis in AXES:
+        sign, shift = -1 if axis[0] == "-" else 1, 2 - "xyz".index(axis[-1])
+        vertices, point, normal = (sign * np.roll(it, shift, axis=-1) for it in (bones.vertices, *plane))
+        names = bone_names(bones.changed(vertices=vertices), Plane(point, normal))
+        found += [axis] * any(name.startswith(("arm", "front_leg")) for name in names)
+    return found
 
 
 def _fork_of_prongs(bones: Skeleton, plane: Plane, least: float) -> np.ndarray:

@@ -11,13 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.limb_names import bone_names
+from ...analysis.limb_names import axes_of_body, bone_names
 from ...analysis.mirror import mirror_plane
 from ...analysis.rigging import armature, bone_before
 from ...analysis.segmentation import vertex_of_cloud
 from ...analysis.skinning import skin_weights
 from ...analysis.surface import Surface, without_loops
 from ...curve.rooted import RootPlace
+from ...data.report import warn
 from ...data.skeleton import Skeleton
 from ...errors import FileFormatError, InvalidCloudError, InvalidParameterError
 from ...geometry.vectors import Floats, box
@@ -92,6 +93,11 @@ def save_rig(
     InvalidParameterError
         There is no such axis; the root is outside of the cloud; or more than `joints` bones between ends and junctions.
 
+    Warns
+    -----
+    SkeletonWarning
+        Limbs have names only if another axis points up.
+
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
@@ -116,8 +122,11 @@ def save_rig(
         _check_root(root, skeleton)
         plane = mirror_plane(skeleton.points if len(skeleton.points) else skeleton.vertices)
         bones = armature(forest, joints, plane if symmetric else None)
-        data = _content(bones, drawn, up, bone_names(bones, plane, up, symmetric), surface)
+        names = bone_names(bones, plane, up, symmetric)
+        data = _content(bones, drawn, up, names, surface)
     write_atomically(path, lambda temporary: temporary.write_bytes(data))
+    if not any(name.startswith("head") for name in names) and (others := axes_of_body(bones, plane)):
+        warn([f"limbs have no names with {up} up, but with {' or '.join(others)} up: does {up} point up?"])
     return bones
 
 

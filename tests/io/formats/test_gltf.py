@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from glsk_o3d import Skeleton, skeletonize, to_tubes
-from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError
+from glsk_o3d.errors import FileFormatError, InvalidCloudError, InvalidParameterError, SkeletonWarning
 from glsk_o3d.io.formats.gltf import save_rig
 from glsk_o3d.samples import sauropod
 
@@ -163,6 +163,13 @@ def test_an_animal_has_limbs_with_names_and_its_handle_is_cut_where_it_is_thin(r
     assert place["head.000"][0] > place["neck.001"][0] > place["front_leg.001_right"][0] > place["hind_leg.001_left"][0]
     assert place["hind_leg.001_left"][0] > place["tail.002"][0]
     assert any(name.startswith("spine") for name in place)
+
+
+def test_a_body_that_lies_down_is_doubted(rig):
+    lying = skeletonize(np.roll(sauropod(3000).points, -1, axis=1))  # its z is y
+    with pytest.warns(SkeletonWarning, match="limbs have no names with z up, but with y up: does z point up"):
+        rig(lying)
+    assert "head.000" in {node.name for node in rig(lying, up="y").nodes}
 
 
 def test_without_radii_the_points_are_the_surface(rig):
