@@ -134,8 +134,8 @@ def _ahead(bones: Skeleton, ends: np.ndarray, legs: list[tuple[int, int]], head:
     """The level direction in which a body looks: that of a biped's feet, or from the hind feet to the head."""
     feet, goal = ends[list(legs[-1])], bones.vertices[ends[head]]
     if len(legs) == 1:
-        last = [bones.edges[(bones.edges == foot).any(axis=1)].sum() - foot for foot in feet]  # the joints before
-        feet, goal = np.array(last), bones.vertices[feet].mean(axis=0)
+        last = bones.edges[np.argsort(bones.edges[:, 1], kind="stable"), 0]  # joints before those but the root
+        feet, goal = last[feet - 1], bones.vertices[feet].mean(axis=0)
     ahead: Floats = goal - bones.vertices[feet].mean(axis=0)
     ahead = ahead - ahead @ VERTICAL[up] * VERTICAL[up]
     least = LEAST_FOOT * np.ptp(bones.vertices @ VERTICAL[up]) if len(legs) == 1 else 0

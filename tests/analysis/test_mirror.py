@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from glsk_o3d import Skeleton, samples
-from glsk_o3d.analysis.limb_names import bone_names
+from glsk_o3d.analysis.limb_names import axes_of_body, bone_names
 from glsk_o3d.analysis.mirror import Plane, mirror_plane, mirrored_branches
 from glsk_o3d.analysis.rigging import armature
 from glsk_o3d.io.formats.graphs import as_forest
@@ -123,7 +123,9 @@ def test_fingers_and_toes_belong_to_their_limb(fingers, toes, joints):
         more += prongs(curves[side - 1][-1], curves[side - 1][-2], toes, 0.06)
     forest = body("person", more=more)
     bones = armature(forest, joints)
-    names = bone_names(bones, Plane(np.zeros(3), np.array([1.0, 0, 0])))
+    plane = Plane(np.zeros(3), np.array([1.0, 0, 0]))
+    names = bone_names(bones, plane)
+    assert "z" in axes_of_body(bones, plane)
     assert {"head", "arm", "leg"} <= {each.split(".")[0] for each in names} <= {"head", "neck", "spine", "arm", "leg"}
     assert len(set(names)) == len(names)
     x, z = bones.vertices[bones.edges[:, 1]][:, [0, 2]].T
@@ -135,6 +137,7 @@ def test_fingers_and_toes_belong_to_their_limb(fingers, toes, joints):
 def test_what_is_no_body_has_numbers():
     animal, plant = body("animal"), samples.tree(500, forks=2)
     feet_up = animal.changed(vertices=animal.vertices * [1, 1, -1])
+    assert "-z" in axes_of_body(armature(feet_up), mirror_plane(feet_up.vertices))
     for forest in (feet_up, as_forest(Skeleton(plant.nodes, plant.edges, plant.radii, (), (), ()), True, None)):
         names = bone_names(armature(forest), mirror_plane(forest.vertices))
         assert all(name.startswith("branch_") and name[-4] == "." for name in names)
