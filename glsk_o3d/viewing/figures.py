@@ -46,8 +46,8 @@ def thinned(points: np.ndarray, most: int) -> np.ndarray:
 
 
 def counts(skeleton: Skeleton) -> dict[str, str]:
-    """The counts of a skeleton and its length, as people read them."""
-    facts = {"points": point_count(skeleton), **structure(skeleton)}
+    """The counts of a skeleton and its length, as people read them; of a cloud alone its points."""
+    facts = {"points": point_count(skeleton), **(structure(skeleton) if len(skeleton.vertices) else {})}
     return {
         name.replace("_", " "): f"{value:.4g}" if name == "length" else f"{value:,}" for name, value in facts.items()
     }

@@ -65,8 +65,9 @@ def test_planar_clouds_and_clouds_without_a_skeleton(make, tmp_path):
     for skeleton in (whole, Skeleton((), (), (), (), flat, ()), Skeleton((), (), (), (), (), ())):
         save_preview(skeleton, tmp_path / "p.png")
         image = imread(tmp_path / "p.png")
-        drawn.append((is_red(image).any(), is_grey(image).sum() > 1000))
-    assert drawn == [(True, True), (False, True), (False, False)]
+        drawn.append((is_red(image).any(), is_grey(image).sum() > 1000, *preview.figures.counts(skeleton)))
+    assert drawn[0][:4] == (True, True, "points", "vertices")
+    assert drawn[1:] == [(False, True, "points"), (False, False, "points")]
 
 
 def open_figures():
