@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import InvalidParameterError
 from ..geometry.vectors import norm
+from ..parameters import shown
 from .grasp_sections import Sections
 from .gripper import Gripper
 
@@ -199,6 +200,6 @@ def checked_plane(plane: Any) -> np.ndarray:
     except (TypeError, ValueError):
         numbers = np.zeros(4)
     if not (np.isfinite(numbers).all() and numbers[:3].any()):
-        must = "must be finite a, b, c, d of ax + by + cz + d = 0, a, b, c not all 0"
-        raise InvalidParameterError(f"plane = {plane!r}: {must}")
+        must = "must be four finite numbers a, b, c, d of ax + by + cz + d = 0, a, b, c not all 0"
+        raise InvalidParameterError(f"plane = {shown(plane)}: {must}, such as 0, 0, 1, -0.5 for the table z = 0.5")
     return numbers

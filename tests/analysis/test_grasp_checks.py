@@ -179,9 +179,9 @@ def test_fingers_reach_as_far_as_the_part_and_no_farther_than_they_can():
     np.testing.assert_allclose(grasp(rod()).depth, HAND.reach)
 
 
-@pytest.mark.parametrize("plane", [(0, 0, 0, 1), (0, 0, np.nan, 1), (0, 0, 1), "table"])
+@pytest.mark.parametrize("plane", [(0, 0, 0, 1), (0, 0, np.nan, 1), (0, 0, 1), "table", ((0, 0, 1, 0), [0] * 999)])
 def test_impossible_planes_and_empty_clouds_are_refused(plane):
-    with pytest.raises(InvalidParameterError, match="plane"):
+    with pytest.raises(InvalidParameterError, match=r"plane = .{,210}: must be four finite numbers .* such as 0, 0, 1"):
         grasp(rod(), plane=plane)
     with pytest.raises(InvalidCloudError, match="empty"):
         grasp(rod(), cloud=np.empty((0, 3)))

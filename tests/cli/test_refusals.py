@@ -25,7 +25,7 @@ TABLE = """
     1 rig o.ply -o r.glb                                   | 1 loop(s): pass cut_loops=True (--cut-loops) to drop
     1 rig bare.obj -o r.glb                                | a rig needs radii or points: read the skeleton from
     2 grasps rod.npz --opening -1                          | max_opening = -1.0: must be above 0
-    2 grasps rod.npz --opening 1 --plane 0,0,0,1           | must be finite a, b, c, d of ax + by + cz + d = 0
+    2 grasps rod.npz --opening 1 --plane 0,0,0,1           | must be four finite numbers a, b, c, d of ax + by + cz
     2 grasps rod.npz --opening 1 -o g.ply                  | the grasps are JSON or CSV and its name ends in .json
     2 grasps y.ply --opening 1                             | has no confidence: give min_confidence=0 (--min-
     1 grasps rod.npz --opening 1 --cloud none.ply          | none.ply: no such file

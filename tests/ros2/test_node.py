@@ -322,7 +322,7 @@ def test_the_script_does_what_the_node_does(recorded, types, tmp_path, expected,
     monkeypatch.chdir(tmp_path)
     for words, message in (
         ("in no --topic /points --opening -1", "opening = -1"),
-        ("in no --topic /points --plane 0 0 -1 inf", "must be finite a, b, c, d"),
+        ("in no --topic /points --plane 0 0 -1 inf", "must be four finite numbers a, b, c, d"),
         ("in no --topic /frame", "has no clouds on /frame; there are some on /points"),
         ("in in --topic /points", "exists already"),
         ("nowhere no --topic /points", "nowhere"),
