@@ -72,7 +72,7 @@ def _cloud_facts(file: Path, where: str | None) -> dict[str, Any]:
         whole["median_spacing"] = float(spacing)  # to the nearest other point
     low, high = np.fmin.reduce(corners), np.fmax.reduce(corners)
     return {
-        **{"kind": "cloud", "points": n, "not_finite": n - n_finite},
+        **{"kind": "mesh" if whole.get("triangles") else "cloud", "points": n, "not_finite": n - n_finite},
         **whole,
         **{"lowest": low.tolist(), "highest": high.tolist(), "diagonal": float(np.linalg.norm(high - low))},
         **{"colours": block.colors is not None, "normals": block.normals is not None},
@@ -110,7 +110,7 @@ def _skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
         "radii": (float(radii.min()), float(radii.max())) if len(radii) else None,
         "points": len(skeleton.points) or None,
     }
-    run = {name: getattr(report, name) for name in ("stages", "converged", "stop_reason", "versions")}
+    run = {name: getattr(report, name) for name in ("stages", "on_medial_axis", "converged", "stop_reason", "versions")}
     run |= {name: list(getattr(report, name)) for name in ("uncertain", "unsupported", "warnings")}
     return {**facts, **run} if report.stages else facts
 

@@ -40,7 +40,7 @@ def test_numbers_of_a_cloud(reported, tmp_path, write_scan):
     assert (facts["colours"], facts["normals"]) == (False, False)
     (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     facts = reported("m.obj")
-    assert (facts["kind"], facts["points"], facts["triangles"]) == ("cloud", 3, 1)
+    assert (facts["kind"], facts["points"], facts["triangles"]) == ("mesh", 3, 1)
     write_scan(tmp_path / "bad.ply", np.full((3, 3), np.nan))
     facts = reported("bad.ply")
     assert (facts["not_finite"], facts["diagonal"], facts["median_spacing"]) == (3, None, None)
@@ -68,7 +68,7 @@ def test_skeletons_of_every_format_and_the_report_of_the_run(reported, skeleton,
         assert facts["length"] == pytest.approx(item.length)
         assert (facts["radii"] is None) == bool(np.isnan(item.radii).all())
     facts, report = reported("s.npz"), skeleton["s.npz"].report
-    assert facts["stop_reason"] == report.stop_reason
+    assert (facts["stop_reason"], facts["on_medial_axis"]) == (report.stop_reason, False)
     assert facts["stages"] == list(report.stages)
     assert [item["n_points"] for item in facts["iterations"]] == [item.n_points for item in report.iterations]
     assert all(f"{item.explained:.4f}" in invoke("info", "s.npz").stdout for item in report.iterations)
