@@ -23,12 +23,13 @@ class WarningNumbers:
     regular: float = precision(1e-9, "weight of the first vertex, per point, where normals do not say where they meet")
     low_confidence: float = warning(0.1, "confidence below which a vertex is not to be trusted")
     low_share: float = warning(0.25, "share of the points around such vertices that is worth a warning")
+    opened: float = warning(0.1, "opened loops that are handles, over the ends: trees have .02, rings and frames .25")
 
 
 WARN = WarningNumbers()
 
 
-DIAGNOSES = ("sheet", "sphere", "no edges", "close call", "weak region")
+DIAGNOSES = ("sheet", "sphere", "no edges", "close call", "weak region", "opened loops")
 """The codes of the reasons that `diagnose` gives."""
 
 
@@ -50,7 +51,7 @@ def diagnose(curve: Curve) -> list[Reason]:
     two sides; or it is of a component whose curve is hardly longer than the part is wide: a coin, a plate. Sphere-like:
     the normal lines of a whole component meet in one point, or it is hardly longer than thick. All are scale-free. Of a
     cloud that is neither, the parts with little confidence are named, and the least certain question about loops, air
-    and gaps. No edges at all are a reason, too.
+    and gaps. No edges at all are a reason, too, and a tree made of what has loops.
     """
     if len(curve.cloud.rows) == 0:
         return []
@@ -60,7 +61,7 @@ def diagnose(curve: Curve) -> list[Reason]:
     if len(curve.edges) == 0:
         text = "no edges: every part became one vertex; is Connector.radius larger than the parts are long?"
         return [Reason("no edges", text)]
-    return _weak_region(curve) + _close_calls(curve)
+    return _weak_region(curve) + _close_calls(curve) + _opened_loops(curve)
 
 
 def _sheet(curve: Curve) -> Reason | None:
@@ -142,6 +143,20 @@ def _close_calls(curve: Curve) -> list[Reason]:
     )
     numbers = dict(close=len(close), asked=asked, probability=close[0].probability)
     return [Reason("close call", text, close[0].place, numbers)]
+
+
+def _opened_loops(curve: Curve) -> list[Reason]:
+    """A graph without loops, made by request of an object that probably has some, for the number of its ends."""
+    clear = [call for call in curve.report.decisions if call.about == "loop" and not call.is_uncertain]
+    handles = [call for call in clear if call.probability > 0.5]
+    if curve.n_loops or len(handles) <= WARN.opened * len(curve.leaves):
+        return []
+    surest = max(handles, key=lambda call: call.probability)
+    text = (
+        f"opened loops: the graph has none, but {surest.question} with a probability of {surest.probability:.2f}: "
+        "is the object a tree? The pipeline 'default' without a root keeps loops"
+    )
+    return [Reason("opened loops", text, surest.place, dict(probability=surest.probability))]
 
 
 def _weak_region(curve: Curve) -> list[Reason]:

@@ -71,6 +71,7 @@ CODES = {
     "no edges": Verdict.NO_CURVE_SKELETON,
     "weak region": Verdict.DOUBTFUL,
     "close call": Verdict.DOUBTFUL,
+    "opened loops": Verdict.DOUBTFUL,
     "other samples": Verdict.DOUBTFUL,
     "low score": Verdict.DOUBTFUL,
     "unknown score": Verdict.DOUBTFUL,
@@ -89,8 +90,9 @@ class Reason:
     Attributes
     ----------
     code : str
-        Of `CODES`: ``"sheet"``, ``"sphere"``, ``"no edges"``, ``"weak region"``, ``"close call"``, ``"other samples"``,
-        ``"low score"``, ``"unknown score"``, ``"tiles"``, ``"mixed pixels"``, ``"option"`` or ``"other"``.
+        Of `CODES`: ``"sheet"``, ``"sphere"``, ``"no edges"``, ``"weak region"``, ``"close call"``, ``"opened loops"``,
+        ``"other samples"``, ``"low score"``, ``"unknown score"``, ``"tiles"``, ``"mixed pixels"``, ``"option"`` or
+        ``"other"``.
     text : str
         The sentence that is issued as a SkeletonWarning.
     place : (x, y, z) or ()

@@ -53,7 +53,8 @@ class Refiner(Filter[Skeleton, Skeleton]):
     -----
     SkeletonWarning
         For sphere-like and sheet-like clouds, which have no meaningful curve skeleton. For regions where many points do
-        not determine the axis; it names the region. For close calls about loops, air or gaps; it names the closest.
+        not determine the axis; it names the region. For close calls about loops, air or gaps; it names the closest. For
+        a tree that is made of what has loops.
 
     References
     ----------

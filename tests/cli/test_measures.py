@@ -88,6 +88,9 @@ def test_a_table_of_trees_has_a_row_for_each_and_the_errors(invoke, tmp_path, y,
     page = (tmp_path / "tree.html").read_text("utf-8")
     for label in ("length with traced", "volume without traced", "Taper", "Diameter classes"):
         assert label in page
+    write_scan(tmp_path / "ring.ply", samples.torus(1000).points)
+    (ring,) = json.loads(invoke("tree", "ring.ply", "--json").stdout)["trees"]
+    assert (ring["verdict"], ring["reasons"][0].split(":")[0]) == ("doubtful", "opened loops")
     (facts,) = json.loads(invoke("tree", "scan.ply", "--json").stdout)["trees"]
     several = json.loads(invoke("tree", "scan.ply", "bad.json", "--json").stdout)["trees"]
     assert several[0] == facts

@@ -94,6 +94,17 @@ def test_a_warning_names_the_closest_call(refine):
         assert words in message
 
 
+def test_a_tree_of_what_has_loops_is_doubted(refine):
+    """Not if the graph has a loop, if it is a close call, which has its own warning, or one among many ends."""
+    path = skeleton_of(torus(1600))
+    ring, star = (replace(path, edges=edges) for edges in ([*path.edges, [0, 11]], [[0, i] for i in range(1, 12)]))
+    cases = (path, 0.95, True), (ring, 0.95, False), (path, 0.7, False), (star, 1.0, False)
+    for skeleton, probability, doubted in cases:
+        call = replace(CALLS[0], probability=probability, changed=True)
+        reasons = refine(skeleton.with_report(Report(decisions=(call,)))).reasons
+        assert ("opened loops" in {reason.code for reason in reasons}) == doubted
+
+
 @pytest.mark.parametrize(
     ("about", "option", "cut_above"), [("loop", "handle", False), ("air", "air", True), ("gap", "bridge", True)]
 )
