@@ -55,7 +55,9 @@ def asked(n=6000):
     rng = np.random.default_rng(0)
     facts = rng.normal(size=(n, 2))
     is_so = rng.random(n) < expit(facts @ [2, -1] - 0.5)
-    return [dict(facts=dict(one=a, other=b), is_so=so) for (a, b), so in zip(facts.tolist(), is_so, strict=True)]
+    return [
+        dict(facts=dict(one=a, other=b), is_so=so, share=1) for (a, b), so in zip(facts.tolist(), is_so, strict=True)
+    ]
 
 
 class TestArithmetic:
@@ -63,6 +65,10 @@ class TestArithmetic:
         weights = calibrate.fitted(asked())
         np.testing.assert_allclose([*weights.values()], [-0.5, 2, -1], atol=0.15)
         assert [*weights] == ["constant", "one", "other"]
+        some = asked(500)
+        lies = [it | dict(is_so=not it["is_so"], share=1e-9) for it in some]  # a cloud with very many counts once
+        found, known = ([*calibrate.fitted(these).values()] for these in ([*some, *lies], some))
+        np.testing.assert_allclose(found, known, rtol=0.03)  # the penalty counts half, of twice as many
         plain = [it | dict(is_so=it["facts"]["one"] > 0) for it in asked(200)]
         assert 2 < calibrate.fitted(plain)["one"] < 20  # an answer that one fact gives away has finite weights
 

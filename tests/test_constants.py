@@ -42,7 +42,7 @@ def test_every_number_says_where_it_comes_from(path):
 
 def test_the_numbers_of_all_steps_are_listed():
     numbers = steering.steering()
-    assert {each.name for each in numbers} >= {"amplification", "limb: slenderness", "line_variance", "diffusion"}
+    assert {each.name for each in numbers} >= {"amplification", "limb: crease", "line_variance", "diffusion"}
     assert all(each.what and each.origin for each in (*numbers, *steering.all_fields()))
 
 

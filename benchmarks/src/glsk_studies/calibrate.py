@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict
+from itertools import product
 from pathlib import Path
 from typing import Annotated
 
@@ -54,9 +55,13 @@ app = application(__doc__)
 
 
 def by_question(rows: list[dict]) -> dict[str, list[Question]]:
-    """The questions of all clouds, by what they are about."""
-    asked = [it | dict(shape=row["shape"], family=row["family"]) for row in rows for it in row.get("questions", ())]
-    return {about: known for about in QUESTIONS if (known := pick(asked, about=about))}
+    """The questions of all clouds, by what they are about, each with its `share` of the `shape`'s cloud."""
+    found: dict[str, list[Question]] = {about: [] for about in QUESTIONS}
+    for row, about in product(rows, QUESTIONS):
+        here = pick(row.get("questions", ()), about=about)
+        facts = dict(shape=row["shape"], family=row["family"], share=1 / max(len(here), 1))
+        found[about] += [it | facts for it in here]
+    return {about: asked for about, asked in found.items() if asked}
 
 
 def answers(asked: list[Question]) -> np.ndarray:
@@ -65,22 +70,28 @@ def answers(asked: list[Question]) -> np.ndarray:
 
 
 def fitted(asked: list[Question]) -> dict[str, float]:
-    """The weights with which the questions are answered best."""
+    """The weights with which the questions are answered best; each cloud counts once, however many it has."""
     names = list(asked[0]["facts"])
     facts = np.array([[it["facts"][name] for name in names] for it in asked])
-    weights = logistic_weights(facts, answers(asked), PENALTY)
+    share = np.array([it["share"] for it in asked])
+    weights = logistic_weights(facts, answers(asked), PENALTY, share / share.mean())
     return dict(zip(["constant", *names], weights.tolist(), strict=True))
 
 
-def logistic_weights(facts: np.ndarray, is_so: np.ndarray, penalty: float) -> np.ndarray:
-    """A constant and a weight for each fact, (1 + f,) float array: least log loss, with a light L2 penalty."""
+def logistic_weights(
+    facts: np.ndarray, is_so: np.ndarray, penalty: float, share: np.ndarray | float = 1.0
+) -> np.ndarray:
+    """A constant and a weight for each fact, (1 + f,) float array: least log loss, with a light L2 penalty.
+
+    Each of the (n, f) facts counts by its `share` (n,).
+    """
     table = np.column_stack([np.ones(len(facts)), facts])
     penalties = penalty * np.append(0, np.ones(facts.shape[1]))
 
     def loss(weights):
         total = table @ weights
-        value = np.logaddexp(0, np.where(is_so, -total, total)).sum() + penalties @ weights**2 / 2
-        return value, table.T @ (expit(total) - is_so) + penalties * weights
+        value = (share * np.logaddexp(0, np.where(is_so, -total, total))).sum() + penalties @ weights**2 / 2
+        return value, table.T @ (share * (expit(total) - is_so)) + penalties * weights
 
     return minimize(loss, np.zeros(table.shape[1]), jac=True, method="BFGS").x
 

@@ -29,8 +29,6 @@ class LimbNumbers:
     quantile: float = fitted(0.9, "share of a spur's points that its reach covers")
     least_out: float = fitted(0.3, "half widths below which a protrusion says no more")
     long: float = derived(4.0, "half widths of a part that is twice as long as it is wide")
-    slenderest: float = derived(0.2, "radius over that of the junction below which a branch is no more of a limb")
-    stoutest: float = derived(2.0, "the same above which it is no less of one")
     sure_sine: float = precision(1e-6, "sine of the angle between branch and width, below which the width is chance")
     directions: int = precision(16, "directions across a branch; eight are enough for flat parts")
 
@@ -54,7 +52,7 @@ class Limbs(Question):
 
     about, repeats = "limb", True
     weights: ClassVar[Mapping[str, float]] = dict(  # fitted
-        constant=-3.0, protrusion=3.2, certainty=1.8, slenderness=1.0
+        constant=-4.9, protrusion=3.9, certainty=2.5, crease=5.1
     )
 
     def __init__(self) -> None:
@@ -67,7 +65,7 @@ class Limbs(Question):
         The facts are: how far its points (all but a tenth, and of a long limb those outside of its body) stand out of
         the surface around the other limbs, over its own half width, as a logarithm, of which, if positive, the share is
         left out that has the object beside it; how certain it is, minus the logarithm of what its mean confidence lacks
-        of 1; and how slender, minus the logarithm of its radius over the distance of the surface from the junction.
+        of 1; and how much of a crease the surface has where it leaves the others, see `_creases`.
         """
         curve = evidence.curve
         if self._mute.any():
@@ -111,8 +109,7 @@ def _facts(
 ) -> Iterator[dict[str, float]]:
     """What speaks for some branches, given by their numbers and as paths from their junctions."""
     degree, cloud, sections = curve.degree, curve.cloud, curve.sections
-    count, wide = cloud.mass, sections.half_width
-    radius, confidence = sections.radius, np.nan_to_num(curve.confidence)
+    count, wide, confidence = cloud.mass, sections.half_width, np.nan_to_num(curve.confidence)
     ending = np.zeros(len(degree), bool)
     for branch in limbs.branches:
         if 1 in degree[branch[[0, -1]]]:
@@ -121,19 +118,18 @@ def _facts(
     outside = [_outside(curve.vertices, path, distance[path[0]], wide) for _, path in asked]
     half = np.array([np.average(wide[part], weights=count[part]) for part in outside])
     beside = _beside(surface, curve.vertices, sections.across, [path for _, path in asked], half)
-    for (k, path), part, own_half, shared in zip(asked, outside, half, beside, strict=True):
+    creases = _creases(curve, surface, [path for _, path in asked], half)
+    for (k, path), part, own_half, shared, crease in zip(asked, outside, half, beside, creases, strict=True):
         junction, body = int(path[0]), path[1:]
         own = cloud.points[cloud.members.of(part)]
         # by how far they are, and not as they come, which depends on how the object is turned
         points = own[np.argsort(norm(own - curve.vertices[junction]))][:: len(own) // LIMB.points + 1]
         out = max(_standing_out(limbs, k, junction, points, ending), 0.0) if own_half > 0 else 0.0
-        own_radius = np.average(radius[part], weights=count[part])
-        ratio = own_radius / max(distance[junction], own_radius / LIMB.stoutest, TINY)
         protrusion = float(np.log(out / max(own_half, TINY) + LIMB.least_out))
         yield dict(
             protrusion=protrusion - float(shared) * max(protrusion, 0),
             certainty=-float(np.log1p(-np.average(confidence[body], weights=count[body]))),
-            slenderness=-float(np.log(max(ratio, LIMB.slenderest))),
+            crease=crease,
         )
 
 
@@ -146,6 +142,30 @@ def _outside(vertices: np.ndarray, path: np.ndarray, surface: float, wide: np.nd
     away = norm(vertices[body] - vertices[path[0]])
     part = body[np.flatnonzero(away <= surface).max(initial=-1) + 1 :]
     return part if len(part) and away[-1] - surface > LIMB.long * quantile(wide[part]) else body
+
+
+def _creases(curve: Curve, surface: Surface, paths: list[np.ndarray], half: np.ndarray) -> list[float]:
+    """The concave share of all turns of the surface along some branches, up to their caps: 0 of a corner of a box.
+
+    A limb leaves a body in a crease, which a spur into an edge or a corner lacks. Every link of a point to one near it
+    turns by the difference of their normals along it, and counts by how far it leads along the branch, cos^2. The cap
+    is as long as the half width `half` (b,) of the branch.
+    """
+    vertex, tangent = curve.vertex_of_point[surface.supporting], np.zeros_like(curve.vertices)
+    for path in paths:
+        tangent[path[1:]] = np.gradient(curve.vertices[path], axis=0)[1:]
+    to = surface.neighbours[:, 1:]
+    link = surface.points[to] - surface.points[:, None]
+    turn = np.einsum("nkj,nkj->nk", surface.normals[to] - surface.normals[:, None], link)
+    turn *= np.einsum("nkj,nj->nk", link, unit(tangent)[vertex]) ** 2
+    turn /= np.maximum(np.linalg.norm(link, axis=2), TINY) ** 3
+    concave, convex = (np.bincount(vertex, np.maximum(sign * turn, 0).sum(axis=1), len(tangent)) for sign in (-1, 1))
+    creases = []
+    for path, cap in zip(paths, half, strict=True):
+        along = arc_lengths(curve.vertices[path])
+        stem = path[1 : max(np.searchsorted(along, along[-1] - cap, "right"), 2)]
+        creases.append(float(concave[stem].sum() / max((concave + convex)[stem].sum(), TINY)))
+    return creases
 
 
 def _beside(
