@@ -10,6 +10,7 @@ from ...geometry.groups import component_labels
 from ...geometry.near_links import linked
 from ...geometry.numbers import fitted
 from ...geometry.vectors import Ints, norm, unit
+from ..numbers import CURVE
 
 
 @dataclass(frozen=True)
@@ -21,9 +22,7 @@ class ContinuationNumbers:
     gap: float = fitted(20.0, "longest gap over the radius")
     ahead: float = fitted(0.9, "least cosine between the gap and the direction of the end")
     taper: float = fitted(0.5, "least radius where it goes on, over that of the end")
-    margin: float = fitted(1.5, "radii at either end of the gap that may have points")
-    hollow: float = fitted(1.5, "radii around the gap without points")
-    empty: float = fitted(0.5, "least share of the gap of which that holds")
+    hollow: float = fitted(1.5, "radii around a gap without points, most of it and not near its ends")
 
 
 CONTINUATION = ContinuationNumbers()
@@ -57,7 +56,7 @@ def _ahead(places: np.ndarray, edges: np.ndarray, radius: np.ndarray, points: np
         return None
     offset = np.sqrt(np.maximum(length**2 - along**2, 0))
     place = int(np.where(fits, along + CONTINUATION.span * offset, np.inf).argmin())
-    between = np.arange(CONTINUATION.margin * thick, length[place] - CONTINUATION.margin * thick, thick / 2)
+    between = np.arange(CONTINUATION.hollow * thick, length[place] - CONTINUATION.hollow * thick, thick / 2)
     line = places[end] + between[:, None] * gap[place] / length[place]
-    is_gap = len(line) and (cKDTree(points).query(line)[0] > CONTINUATION.hollow * thick).mean() > CONTINUATION.empty
+    is_gap = len(line) and (cKDTree(points).query(line)[0] > CONTINUATION.hollow * thick).mean() > CURVE.majority
     return place if is_gap else None

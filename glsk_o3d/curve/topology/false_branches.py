@@ -25,11 +25,10 @@ class FalseBranchNumbers:
     """Numbers of `FalseBranches`."""
 
     window: float = derived(1.0, "radii of a branch along which evidence is averaged; false edges have two or more")
-    scatter: float = fitted(0.05, "least scatter of winding numbers along a curve, over their median")
     deviation: float = derived(1.4826, "standard deviation of a normal distribution over its median absolute one")
-    least_surface: float = fitted(0.05, "share of a tube's area below which the surface says no more")
-    least_bonds: float = fitted(0.05, "share of a tube's points below which bonds say no more")
-    least_length: float = fitted(0.1, "radii below which a length says no more")
+    least: float = fitted(
+        0.05, "share of a tube's area or points, or scatter over a median, below which it says no more"
+    )
 
 
 FALSE_BRANCH = FalseBranchNumbers()
@@ -84,7 +83,7 @@ def branch_facts(evidence: Evidence) -> Iterator[tuple[np.ndarray, int, dict[str
     vertices, edges, m = curve.vertices, curve.edges, len(curve.vertices)
     length = np.maximum(curve.edge_lengths, TINY)
     typical = quantile(winding)
-    scatter = FALSE_BRANCH.deviation * quantile(np.abs(winding - typical)) + FALSE_BRANCH.scatter * abs(typical)
+    scatter = FALSE_BRANCH.deviation * quantile(np.abs(winding - typical)) + FALSE_BRANCH.least * abs(typical)
     tubes = 2 * np.pi * np.maximum(curve.radii[edges].mean(axis=1), TINY) @ length
     area = evidence.area.sum()
     seen = max(area / max(tubes, area * TINY, TINY), TINY)  # a line has no tubes
@@ -115,12 +114,12 @@ def branch_facts(evidence: Evidence) -> Iterator[tuple[np.ndarray, int, dict[str
         surface = areas[k] / tube
         facts = dict(
             deficit=np.log1p(max((typical - smooth[k]) / max(scatter, TINY), 0)),
-            surface=np.log(max(surface / seen, 0) + FALSE_BRANCH.least_surface),
+            surface=np.log(max(surface / seen, 0) + FALSE_BRANCH.least),
             straightness=_straightness(vertices, around, branch, k, radius),
             noise=curve.report.noise,
-            bonds=np.log(float(bonded.min()) / 2 * evidence.surface.spacing / tube + FALSE_BRANCH.least_bonds),
+            bonds=np.log(float(bonded.min()) / 2 * evidence.surface.spacing / tube + FALSE_BRANCH.least),
             inner=float((curve.degree[branch[[0, -1]]] > 1).all()),
-            length=np.log(ends[-1] / radius + FALSE_BRANCH.least_length),
+            length=np.log(ends[-1] / radius + CURVE.little),
         )
         yield branch, k, facts
 

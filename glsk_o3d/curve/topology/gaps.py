@@ -28,7 +28,6 @@ class GapNumbers:
     detour: float = fitted(3.0, "least way along the curve over that across the gap")
     least_winding: float = derived(-0.5, "relative winding number below which it says no more")
     most_winding: float = derived(1.3, "relative winding number above which it says no more")
-    least_cap: float = fitted(0.1, "flux below which the cap of an end says no more")
 
 
 GAPS = GapNumbers()
@@ -96,7 +95,7 @@ def gap_facts(evidence: Evidence) -> Iterator[tuple[tuple[int, int], dict[str, f
     for (end, other), least in zip(bridges, winding, strict=True):
         facts = dict(
             winding=float(np.clip(least, GAPS.least_winding, GAPS.most_winding)),
-            cap=float(np.log(_cap(end, surface) + GAPS.least_cap)),
+            cap=float(np.log(_cap(end, surface) + CURVE.little)),
         )
         yield (end.leaf, other), facts
 

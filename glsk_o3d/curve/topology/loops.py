@@ -38,7 +38,6 @@ class LoopNumbers:
     sectors: int = precision(16, "directions around a place in which walls are looked for")
     least_opening: float = fitted(0.5, "spacings below which an opening says no more")
     least_passage: float = fitted(0.3, "spacings below which a passage says no more")
-    least_bonds: float = fitted(0.1, "share of the median below which bonds say no more")
 
 
 LOOP = LoopNumbers()
@@ -119,7 +118,7 @@ class LoopFacts(NamedTuple):
 
     def without_normals(self) -> LoopFacts:
         """The same with bonds all around, and something inside."""
-        return self._replace(facts=self.facts | dict(bonds=float(np.log(1 + LOOP.least_bonds))), inside=CURVE.inside)
+        return self._replace(facts=self.facts | dict(bonds=float(np.log(1 + CURVE.little))), inside=CURVE.inside)
 
 
 def _is_frame_of_wires(curve: Curve, wide: list[int]) -> bool:
@@ -161,7 +160,7 @@ def loop_facts(cycles: list[np.ndarray], evidence: Evidence) -> list[LoopFacts]:
         facts = dict(
             opening=float(np.log(min(view.radius / spacing, LOOP.wide_open) + LOOP.least_opening)),
             passage=float(np.log(passage + LOOP.least_passage)),
-            bonds=float(np.log(crossing.min() / max(quantile(crossing), TINY) + LOOP.least_bonds)),
+            bonds=float(np.log(crossing.min() / max(quantile(crossing), TINY) + CURVE.little)),
         )
         answers.append(LoopFacts(facts, inside, view.centre, int(np.argmin(crossing))))
     return answers
