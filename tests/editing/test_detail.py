@@ -25,7 +25,7 @@ from glsk_o3d.samples.capsules import union_sample
 def stout():
     """A thick body with legs, the shortest of which is no limb for the Refiner."""
     nodes, edges = [[-0.5, 0, 0], [0.5, 0, 0]], [[0, 1]]
-    for (x, y), reach in zip(product((-0.35, 0.35), (-0.2, 0.2)), (0.1, 0.2, 0.3, 0.5), strict=True):
+    for (x, y), reach in zip(product((-0.35, 0.35), (-0.2, 0.2)), (0.06, 0.2, 0.3, 0.5), strict=True):
         edges.append([len(nodes), len(nodes) + 1])
         nodes += [[x, 0, 0], [x, y, -0.25 - reach]]
     radii = np.repeat([0.35, 0.1], [2, 8])
