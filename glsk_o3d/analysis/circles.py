@@ -54,7 +54,7 @@ def fit_circle(points: np.ndarray) -> CircleFit | None:
         circle = least_squares(_residuals, circle, _jacobian, method="lm", args=(p[counted],)).x
     _, gaps, covered = _around(circle, p[counted])
     n, radius, jacobian = int(counted.sum()), abs(float(circle[2])), _jacobian(circle, p[counted])
-    # of the radius, for distances of variance 1; rounding leaves less than nothing
+    # of the radius, for distances of variance 1; rounding can make it negative
     variance = max(float(np.linalg.pinv(jacobian.T @ jacobian)[2, 2]), 0.0)
     noise = float((_residuals(circle, p[counted]) ** 2).sum()) / (n - 3) / radius**2
     return CircleFit(radius, float(gaps[covered].sum()), n, float(np.sqrt(variance * (noise + n * WAVINESS**2))))

@@ -109,7 +109,8 @@ class GraspCandidates(Rows, row="grasp"):
     places : int
         Number of places along the skeleton that were searched: all, unless a budget ended it.
     left_out : dict of str to int
-        Numbers of rejected places, and of rejected approaches to the others, by the first reason.
+        Numbers of rejected places, and of rejected approaches to the others, by the first reason; and of places that
+        were not searched.
     """
 
     position: np.ndarray

@@ -27,7 +27,7 @@ class CurveNumbers:
     majority: float = derived(0.5, "share of the points, from which on a cloud is called what they are")
     sheet: float = fitted(0.9, "share of one direction among the normals of a sheet; a tube has .5")
     inside: float = fitted(0.4, "winding number below which an axis is in little: half a tube .5, sparse crowns .2")
-    little: float = fitted(0.1, "of what is 1 somewhere else, below which its logarithm says no more in a question")
+    little: float = fitted(0.1, "share, or radii of a length, below which its logarithm says no more")
     unsure: float = fitted(0.4, "confidence below which the normals do not say where the axis is")
     surface_growth: float = measured(2.5, "growth of links on a surface; noise that fills space has more, a curve 1.7")
 

@@ -44,3 +44,10 @@ def test_a_scaled_cloud_has_the_scaled_skeleton(cloud, pipeline):
                 decision.probability,
                 decision.changed,
             )
+
+
+@pytest.mark.parametrize("scale", [1e-115, 1e115])
+def test_limbs_of_the_smallest_and_the_largest_have_the_same_probabilities(scale):
+    points = samples.sauropod(1500).points
+    one, other = ([it.probability for it in glsk.skeletonize(points * by).report.decisions] for by in (1, scale))
+    np.testing.assert_allclose(other, one, rtol=1e-6)

@@ -43,7 +43,7 @@ QUESTIONS = {
 SEEN, UNSEEN = "all families", "the other families"  # to which weights are fitted
 MEASURES = ("topology", "perfect")
 EVERY = "*_4096"
-Question = dict  # its `facts`, whether it `is_so`, and of which `shape` and `family` it is
+Question = dict  # its `facts`, whether it `is_so`, of which `shape` and `family` it is, and its `share`
 Weights = dict[str, dict[str, float]]
 Judged = Mapping[str, tuple[np.ndarray, list[Question]]]  # probabilities, (n,), by what the questions are about
 Sources = Annotated[
@@ -55,7 +55,7 @@ app = application(__doc__)
 
 
 def by_question(rows: list[dict]) -> dict[str, list[Question]]:
-    """The questions of all clouds, by what they are about, each with its `share` of the `shape`'s cloud."""
+    """The questions of all clouds, by what they are about, each with its `share` of those of its cloud."""
     found: dict[str, list[Question]] = {about: [] for about in QUESTIONS}
     for row, about in product(rows, QUESTIONS):
         here = pick(row.get("questions", ()), about=about)
@@ -70,7 +70,7 @@ def answers(asked: list[Question]) -> np.ndarray:
 
 
 def fitted(asked: list[Question]) -> dict[str, float]:
-    """The weights with which the questions are answered best; each cloud counts once, however many it has."""
+    """The weights with which the questions are answered best; each cloud counts once, however many questions it has."""
     names = list(asked[0]["facts"])
     facts = np.array([[it["facts"][name] for name in names] for it in asked])
     share = np.array([it["share"] for it in asked])

@@ -102,6 +102,9 @@ def keep_scores(bench: BenchmarkFolder, answers: Path, peer: Peer, made: dict) -
     there = replace(bench, shapes={shape: told for shape, told in bench.shapes.items() if shape not in lacking})
     before = [row for row in rows_kept(bench.version, answers.name, peer, made) if row["shape"] in lacking]
     rows = before + (score_answers(there, answers).rows if there.shapes else [])
+    if not rows:
+        typer.echo(f"{answers}: no shape has all its answers yet: nothing is kept")
+        return
     whole = bench.whole and lacking == {row["shape"] for row in before}
     results = Results(bench.name, answers.name, whole, sorted(rows, key=itemgetter("shape")))
     typer.echo(f"{board.keep_scores(results, made)}: {results.failures} failures of {len(results.rows)} clouds")
@@ -175,9 +178,12 @@ def making(peer: Peer) -> tuple[str, str]:
 
 
 def rows_kept(version: str, name: str, peer: Peer, made: dict) -> list[dict]:
-    """The scores in benchmarks/VERSION of a tool's answers, if they were made alike."""
-    told = board.read_kept(version, f"{name}.json.gz")
-    return told["clouds"] if told and all(told["made"][it] == made.get(it) for it in making(peer)) else []
+    """The scores in benchmarks/VERSION of a tool's answers, if they were made alike: a changed commit may be any."""
+    told, known = board.read_kept(version, f"{name}.json.gz"), [made.get(it) for it in making(peer)]
+    is_alike = (
+        told and known == [told["made"][it] for it in making(peer)] and not str(known[0]).endswith(("dirty", "None"))
+    )
+    return told["clouds"] if is_alike else []
 
 
 def answer(cloud: Path, peer: Peer, path: Path) -> dict:

@@ -22,7 +22,7 @@ class ContinuationNumbers:
     gap: float = fitted(20.0, "longest gap over the radius")
     ahead: float = fitted(0.9, "least cosine between the gap and the direction of the end")
     taper: float = fitted(0.5, "least radius where it goes on, over that of the end")
-    hollow: float = fitted(1.5, "radii around a gap without points, most of it and not near its ends")
+    hollow: float = fitted(1.5, "radii around most of a gap without points; so near its ends there may be some")
 
 
 CONTINUATION = ContinuationNumbers()

@@ -94,8 +94,8 @@ def without_surface(cloud: SpacedPoints, least: float) -> np.ndarray:
     growth, flat = (group_sum(facts, vertex, m) / np.maximum(count, 1)[:, None]).T
     thin &= growth < np.where(flat < CURVE.sheet, CURVE.surface_growth, THIN.sheet_growth)
     thin = (_share_around(near, count, thin) > 1 - least) & ~_surely_with_surface(curve)
-    around = thin[vertex]  # none where vertices without points alone are thin
-    return thin & (not around.any() or bool(cloud.scattered[around].mean() <= least))
+    of_points = thin[vertex]  # of none, if only vertices without points are thin
+    return thin & (not of_points.any() or bool(cloud.scattered[of_points].mean() <= least))
 
 
 def without_detached_clumps(curve: Curve) -> Curve:

@@ -155,10 +155,9 @@ def _creases(curve: Curve, surface: Surface, paths: list[np.ndarray], half: np.n
     for path in paths:
         tangent[path[1:]] = np.gradient(curve.vertices[path], axis=0)[1:]
     to = surface.neighbours[:, 1:]
-    link = surface.points[to] - surface.points[:, None]
+    link = unit((surface.points[to] - surface.points[:, None]).reshape(-1, 3)).reshape(*to.shape, 3)
     turn = np.einsum("nkj,nkj->nk", surface.normals[to] - surface.normals[:, None], link)
     turn *= np.einsum("nkj,nj->nk", link, unit(tangent)[vertex]) ** 2
-    turn /= np.maximum(np.linalg.norm(link, axis=2), TINY) ** 3
     concave, convex = (np.bincount(vertex, np.maximum(sign * turn, 0).sum(axis=1), len(tangent)) for sign in (-1, 1))
     creases = []
     for path, cap in zip(paths, half, strict=True):
