@@ -297,13 +297,13 @@ def losses(found: Mapping[str, Sequence[Worse]]) -> Table:
             words, digits, _ = MEASURES[measure]
             best = max(those, key=lambda it: abs(it.difference[0]))
             means = [number(mean, digits) for mean in best.means]
-            difference = told(*best.difference, digits, sign="+")
+            _, *interval = (f"{end:+.{digits}f}" for end in best.difference)
             tools, clouds = ({getattr(it, fact) for it in those} for fact in ("tool", "clouds"))
             more = str(len(tools) - 1) if len(tools) > 1 else ""
             further = f", {len(clouds) - 1} more" if len(clouds) > 1 else ""
-            where = [f"{kind}, {best.clouds}{further}", str(best.shapes), words, _from(best.tool, kind)]
-            lines.append([*where, *means, difference, more])
-    header = ["clouds", "shapes", "measure", "to", "theirs", "`default`", "difference", "others"]
+            where = [f"{kind}, {best.clouds}{further}", words, _from(best.tool, kind)]
+            lines.append([*where, *means, " to ".join(interval), more])
+    header = ["clouds", "measure", "to", "theirs", "`default`", "difference", "others"]
     return "where `default` is worse", header, lines
 
 
