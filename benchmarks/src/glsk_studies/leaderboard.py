@@ -178,12 +178,12 @@ def making(peer: Peer) -> tuple[str, str]:
 
 
 def rows_kept(version: str, name: str, peer: Peer, made: dict) -> list[dict]:
-    """The scores in benchmarks/VERSION of a tool's answers, if they were made alike: a changed commit may be any."""
-    told, known = board.read_kept(version, f"{name}.json.gz"), [made.get(it) for it in making(peer)]
-    is_alike = (
-        told and known == [told["made"][it] for it in making(peer)] and not str(known[0]).endswith(("dirty", "None"))
-    )
-    return told["clouds"] if is_alike else []
+    """The scores in benchmarks/VERSION of a tool's answers, if they were made alike."""
+    told = board.read_kept(version, f"{name}.json.gz")
+    if not told or any(told["made"][it] != made.get(it) for it in making(peer)):
+        return []
+    commit = made.get("commit") or "-dirty"  # of ours: what is not committed may be anything
+    return [] if commit.endswith("-dirty") and not peer.packages else told["clouds"]
 
 
 def answer(cloud: Path, peer: Peer, path: Path) -> dict:
