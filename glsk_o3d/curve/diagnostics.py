@@ -125,8 +125,8 @@ def _stubs(curve: Curve) -> Reason | None:
     is_tree = edges < np.bincount(curve.component_of_vertex, minlength=n)
     share = float(size[is_tree & (length < CURVE.stub * reach)].sum() / len(cloud.vertex))
     text = (
-        f"sphere-like: parts with {share:.0%} of the points are hardly longer than thick, "
-        "so no curve skeleton is meaningful there"
+        f"sphere-like: parts with {share:.0%} of the points are hardly longer than thick, as balls, bowls and boxes are, "
+        "so no curve skeleton is meaningful there; only limbs and handles on them may be right"
     )
     return Reason("sphere", text, numbers=dict(share=share)) if share > CURVE.majority else None
 
@@ -147,8 +147,8 @@ def _close_calls(curve: Curve) -> list[Reason]:
 
 def _opened_loops(curve: Curve) -> list[Reason]:
     """A graph without loops, made by request of an object that probably has some, for the number of its ends."""
-    clear = [call for call in curve.report.decisions if call.about == "loop" and not call.is_uncertain]
-    handles = [call for call in clear if call.probability > 0.5]
+    closed = [call for call in curve.report.decisions if call.about == "loop" and call.changed]
+    handles = [call for call in closed if call.probability > 0.5 and not call.is_uncertain]
     if curve.n_loops or len(handles) <= WARN.opened * len(curve.leaves):
         return []
     surest = max(handles, key=lambda call: call.probability)

@@ -41,6 +41,13 @@ class Changeable:
         return other
 
 
+def forget(value: Any, field: str) -> None:
+    """Let an instance compute anew what depends on a field."""
+    for name in [*vars(value)]:
+        if field in getattr(getattr(type(value), name, None), "fields", ()):
+            del vars(value)[name]
+
+
 def fields_of(value: Any, cls: type[Any]) -> dict[str, Any]:
     """The fields that a value has as an instance of a dataclass, for one that shares them."""
     return {field.name: getattr(value, field.name) for field in fields(cls)}

@@ -13,7 +13,7 @@ from ..errors import InvalidParameterError, brief
 from ..geometry.vectors import FARTHEST_PLACE
 from ..interop.packages import import_open3d, require
 from ..parameters import shown
-from .derived import derived
+from .derived import derived, forget
 from .graph import OF_VERTICES, in_order_of_ends
 from .report import Report
 from .space_curve import SpaceCurve
@@ -114,6 +114,7 @@ class Skeleton(SpaceCurve):
         """The same with another record of the run."""
         other = copy(self)  # what was checked need not be checked again
         object.__setattr__(other, "report", report)
+        forget(other, "report")
         return other
 
     def __repr__(self) -> str:
