@@ -75,8 +75,8 @@ def _sheet(curve: Curve) -> Reason | None:
     flat = one_way & (~(curve.confidence >= WARN.low_confidence) | stub[part])
     share = float(cloud.count[flat].sum() / len(cloud.vertex))
     text = (
-        f"sheet-like: around {share:.0%} of the points the surface faces one direction only, "
-        "so a curve skeleton has little meaning; if that is a table or a floor under an object, remove it first, "
+        f"sheet-like: around {share:.0%} of the points the surface faces one direction only, as that of a plate or a "
+        "pan, so a curve skeleton has little meaning; if that is a table or a floor under an object, remove it first, "
         "with Open3D's segment_plane or read_cloud(..., where='z > ...')"
     )
     return Reason("sheet", text, numbers=dict(share=share)) if share > CURVE.majority else None
@@ -125,8 +125,8 @@ def _stubs(curve: Curve) -> Reason | None:
     is_tree = edges < np.bincount(curve.component_of_vertex, minlength=n)
     share = float(size[is_tree & (length < CURVE.stub * reach)].sum() / len(cloud.vertex))
     text = (
-        f"sphere-like: parts with {share:.0%} of the points are hardly longer than thick, as balls, bowls and boxes are, "
-        "so no curve skeleton is meaningful there; only limbs and handles on them may be right"
+        f"sphere-like: parts with {share:.0%} of the points are hardly longer than thick, as balls, bowls and boxes "
+        "are, so no curve skeleton is meaningful there; only limbs and handles on them may be right"
     )
     return Reason("sphere", text, numbers=dict(share=share)) if share > CURVE.majority else None
 

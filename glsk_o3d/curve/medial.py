@@ -11,7 +11,7 @@ from ..data.contraction import Contraction
 from ..errors import InvalidCloudError
 from ..geometry.groups import component_labels, group_sum
 from ..geometry.inscribed_balls import outward_normals
-from ..geometry.medial_axis import Burnt, MedialAxis, medial_curve
+from ..geometry.medial_axis import Burnt, MedialAxis, medial_curve, without_waves
 from ..geometry.neighbourhoods import nearest_neighbours, spacing, uprightness
 from ..geometry.numbers import fitted
 from ..geometry.vectors import TINY, dot, norm
@@ -83,11 +83,14 @@ class MedialGraph(NamedTuple):
             raise InvalidCloudError(f"a surface with {len(vertices)} vertices has no inside")
         if (burnt := Burnt.of(axis)).has_sheets:
             raise InvalidCloudError("the solid has a cavity: sheets around it are no curve")
-        curve = medial_curve(axis, burnt, vertices)
+        curve, half_widths = medial_curve(axis, burnt, vertices)
         used, edges = np.unique(curve, return_inverse=True)
+        edges, handles = edges.reshape(-1, 2), genus(len(vertices), triangles)
         if len(curve) == 0:
             used = np.array([axis.radii.argmax()])
-        return cls(axis.places[used], axis.radii[used], edges.reshape(-1, 2), genus(len(vertices), triangles))
+            return cls(axis.places[used], axis.radii[used], edges, handles)
+        places = without_waves(axis.places[used], edges, 2 * half_widths[used])  # fire from two sides meets in zigzags
+        return cls(places, axis.radii[used], edges, handles)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from math import dist
 
 import numpy as np
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import Delaunay
 
 from .numbers import derived, precision, speed
+from .solver import factorised
 from .vectors import TINY, dot, norm
 
 
@@ -22,6 +23,7 @@ class MedialNumbers:
 
     limb: float = derived(1.5, "half widths from the curve where a limb begins: corners of square sections are at 1.41")
     flat: float = precision(1e-12, "of the product of its edges: volume of a tetrahedron that has no circumsphere")
+    least_apart: float = precision(1e-2, "of the mean: places of the curve nearer than that count as so far apart")
     chunk: int = speed(64, "places at a time whose distances from all points are computed")
 
 
@@ -208,8 +210,10 @@ class _Fire:
                     self.reach(arrival, end)
 
 
-def medial_curve(axis: MedialAxis, burnt: Burnt, points: np.ndarray) -> np.ndarray:
-    """Edges (m, 2) of the curve on a medial axis: loops, what joins them, and a way from every limb.
+def medial_curve(axis: MedialAxis, burnt: Burnt, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Edges (m, 2) of the curve on a medial axis: loops, what joins them, and a way from every limb; and half widths.
+
+    The half width (p,) of the solid at each place is that across the curve, or of the ball there if that is larger.
 
     `points` (n, 3) are those on the surface. Where one is farther from the curve than one and a half times the half
     width of the solid there, a limb begins: the way of the fire from the pole of the farthest becomes part of the
@@ -230,7 +234,27 @@ def medial_curve(axis: MedialAxis, burnt: Burnt, points: np.ndarray) -> np.ndarr
             place = int(burnt.onward[place])
         distance = np.minimum(distance, _nearest(points, axis.places, width, np.array(way, int)))
     along = np.flatnonzero(is_on & (burnt.onward >= 0))
-    return np.concatenate([axis.edges[burnt.core], np.column_stack([along, burnt.onward[along]])])
+    return np.concatenate([axis.edges[burnt.core], np.column_stack([along, burnt.onward[along]])]), width
+
+
+def without_waves(places: np.ndarray, edges: np.ndarray, length: np.ndarray) -> np.ndarray:
+    r"""Places (p, 3) of a graph without waves along it that are shorter than a `length` (p,) at each; all have edges.
+
+    They are the least of :math:`\int |x - p|^2 + (\ell / 2 \pi)^4 |x''|^2` along the edges, as a smoothing spline is
+    (Reinsch 1967): waves of this length keep half their height, those of half the length a 17th. Ends have no second
+    derivative; elsewhere it is the Laplacian over the edges.
+    """
+    n, m, (a, b) = len(places), len(edges), edges.T
+    apart = norm(places[a] - places[b])
+    apart = np.maximum(apart, MEDIAL.least_apart * apart.mean())
+    stiffness = (length[a] ** 2 + length[b] ** 2) / (8 * np.pi**2 * apart)
+    difference = csr_array((np.tile([1.0, -1.0], m), edges.ravel(), 2 * np.arange(m + 1)), shape=(m, n))
+    mass = np.abs(difference).T @ apart / 2
+    laplacian = difference.T @ diags_array(stiffness) @ difference
+    bent = diags_array((np.bincount(edges.ravel(), minlength=n) > 1) / mass)
+    smooth = factorised((diags_array(mass) + laplacian.T @ bent @ laplacian).tocsc())
+    moved: np.ndarray = smooth.solve(mass[:, None] * places)
+    return moved
 
 
 def _latest(axis: MedialAxis, burnt: Burnt) -> np.ndarray:

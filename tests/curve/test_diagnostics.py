@@ -95,7 +95,7 @@ def test_a_warning_names_the_closest_call(refine):
 
 
 def test_a_tree_of_what_has_loops_is_doubted(refine):
-    """Not if the graph has a loop, if it is a close call, which has its own warning, one among many ends, or was kept."""
+    """Not if the loop was kept, the graph has one, it was a close call, which has a warning, or there are many ends."""
     path = skeleton_of(torus(1600))
     ring, star = (replace(path, edges=edges) for edges in ([*path.edges, [0, 11]], [[0, i] for i in range(1, 12)]))
     cases = (path, 0.95, True), (path, 0.95, False), (ring, 0.95, True), (path, 0.7, True), (star, 1.0, True)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from glsk_o3d import Skeleton
+from glsk_o3d import Skeleton, skeletonize
 
 R = 0.1
 LENGTH = 1.2
@@ -91,3 +91,25 @@ def test_new_vertices_of_an_end_are_like_those_behind(refine):
     assert (skeleton.n_components, len(skeleton.leaves)) == (1, 3)
     distance = np.linalg.norm(skeleton.points - skeleton.vertices[skeleton.vertex_of_point], axis=1)
     assert distance.max() < 1.5 * R
+
+
+def pan(slope, n=4000):
+    """A disc with a wall that leans outwards, by `slope` for each unit of its height of 0.07, and a bar along -x."""
+    rng = np.random.default_rng(0)
+    low, high, thick = 0.2, 0.2 + 0.07 * slope, 0.025
+    area = np.array([np.pi * low**2, np.pi * (low + high) * np.hypot(high - low, 0.07), 2 * np.pi * thick * 0.45])
+    part, u, out = rng.choice(3, (n, 1), p=area / area.sum()), rng.uniform(size=(n, 1)), turned(n, rng)
+    radius = np.choose(part, [low * np.sqrt(u), low + (high - low) * u, 0])
+    body = radius * out[:, [1, 2, 0]] + 0.07 * (part == 1) * u * [0, 0, 1]
+    bar = thick * out + [0, 0, 0.05] - (high + 0.45 * u) * [1, 0, 0]
+    return np.where(part == 2, bar, body)
+
+
+@pytest.mark.filterwarnings("ignore:weakly supported", "ignore:sheet-like")  # a pan is no tube
+@pytest.mark.parametrize("slope", [0.5, 1, 2])
+def test_an_end_stays_between_walls_that_slope(slope):
+    """Their normals meet in front of the mouth of a pan, half its width away."""
+    skeleton = skeletonize(pan(slope))
+    assert (skeleton.n_loops, len(skeleton.leaves)) == (0, 2)
+    assert skeleton.vertices[:, 2].min() > 0
+    assert skeleton.vertices[:, 2].max() < 0.07 + 0.02

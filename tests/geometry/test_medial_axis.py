@@ -5,7 +5,7 @@ import open3d as o3d
 import pytest
 
 from glsk_o3d.geometry.groups import component_labels
-from glsk_o3d.geometry.medial_axis import Burnt, MedialAxis, medial_curve
+from glsk_o3d.geometry.medial_axis import Burnt, MedialAxis, medial_curve, without_waves
 from glsk_o3d.interop.poisson import inside_of
 
 RADIUS, TUBE = 0.4, 0.1
@@ -67,7 +67,9 @@ def test_a_torus_has_the_cells_of_a_loop_and_burns_down_to_its_axis():
     assert np.median(axis.radii[np.unique(core)]) == pytest.approx(TUBE, rel=0.1)
     assert np.median(burnt.times[burnt.core]) == pytest.approx(TUBE, rel=0.5)
     assert (burnt.onward[np.unique(core)] == -1).all()
-    assert loops(medial_curve(axis, burnt, points)) == 1
+    curve, half_widths = medial_curve(axis, burnt, points)
+    assert loops(curve) == 1
+    assert np.median(half_widths[np.unique(core)]) == pytest.approx(TUBE, rel=0.3)
 
 
 def test_balls_are_empty_and_poles_touch():
@@ -90,7 +92,7 @@ def test_every_hole_of_a_plate_is_a_loop(holes, seed):
     burnt = Burnt.of(axis)
     assert len(axis.places) - len(axis.edges) + len(np.unique(axis.face_edges[:, 0])) == 1 - holes
     assert loops(axis.edges[burnt.core]) == holes
-    curve = medial_curve(axis, burnt, points)
+    curve, _ = medial_curve(axis, burnt, points)
     assert loops(curve) == holes
     if holes:
         assert is_inside(axis.places[np.unique(curve)]).all()
@@ -106,7 +108,7 @@ def test_a_way_leads_from_the_tip_of_each_arm(seed):
         filled[tuple(arm)] = True
     points, is_inside = cubes(filled, seed)
     axis = MedialAxis.of(points, is_inside)
-    curve = medial_curve(axis, Burnt.of(axis), points)
+    curve, _ = medial_curve(axis, Burnt.of(axis), points)
     tips = axis.places[np.flatnonzero(np.bincount(curve.ravel()) == 1)] - points.mean(axis=0)
     assert loops(curve) == 0
     assert len(tips) == 6
@@ -125,3 +127,21 @@ def test_sheets_around_a_cavity_are_left():
     axis = MedialAxis.of(points, is_inside)
     assert len(axis.places) - len(axis.edges) + len(np.unique(axis.face_edges[:, 0])) == 2  # Euler's number of a shell
     assert Burnt.of(axis).has_sheets
+
+
+@pytest.mark.parametrize(("wave", "left"), [(0.25, 1 / 17), (0.5, 1 / 2), (1.0, 16 / 17)])
+@pytest.mark.parametrize("closed", [False, True])
+def test_short_waves_of_a_curve_are_smoothed(wave, left, closed):
+    """Steps of different lengths, and of no length; a ring, or a line whose ends and other waves stay."""
+    rng = np.random.default_rng(0)
+    u = np.sort(rng.uniform(size=800))
+    u[400] = u[401]
+    height = 0.02 * np.sin(2 * np.pi * u * 8 / wave)
+    along = [np.cos(2 * np.pi * u), np.sin(2 * np.pi * u)] if closed else [2 * np.pi * u, 0 * u]
+    edges = np.column_stack([np.arange(799), np.arange(1, 800)])
+    edges = np.concatenate([edges, [[799, 0]]]) if closed else edges
+    turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    smooth = without_waves(np.column_stack([*along, height]) @ turn, edges, np.full(800, np.pi / 8)) @ turn.T
+    np.testing.assert_allclose(smooth[:, :2], np.column_stack(along), atol=0.02)
+    inner = slice(100, 700)
+    assert (smooth[inner, 2] @ height[inner]) / (height[inner] @ height[inner]) == pytest.approx(left, abs=0.06)

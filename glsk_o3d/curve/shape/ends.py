@@ -13,7 +13,7 @@ from ...geometry.groups import Members, quantile
 from ...geometry.neighbourhoods import plane_axes
 from ...geometry.numbers import derived, fitted, measured
 from ...geometry.polylines import arc_lengths, place_at
-from ...geometry.vectors import TINY, Floats, cross, dot, norm, unit
+from ...geometry.vectors import TINY, Floats, box, cross, dot, norm, unit
 from ..axis.fit import axis_box
 from ..axis.sections import VertexPoints
 from ..curve import Curve
@@ -59,7 +59,8 @@ def regrow_ends(curve: Curve, to_surface: bool = False) -> Curve:
     with p and its length s along t seen from the last vertex left. A point whose plane passes the curve by half a
     radius counts half, and those beyond the reach do not count. The fit is made three times, each along t + d of the
     one before. See `_End.tip` and `_End._cap` for where it stops, which may also be where the axis comes `to_surface`.
-    No end leaves its points.
+    No end goes beyond its points, nor farther aside than these are: normals of walls that slope, as of a pan, meet far
+    in front of its mouth.
 
     New vertices come behind all others, with the confidence of the run behind and the radii of their own sections.
     Points of a vertex that was cut belong to the nearest one of the same end. Loops and vertices without edges stay.
@@ -139,7 +140,18 @@ def _grow(curve: Curve, path: np.ndarray, first: int, other: bool, to_surface: b
     tip = max(tip, step / 2)
     # edges of no length are those of no limb
     number = max(round(min(tip / max(step, TINY), len(points))), 1)
-    return _Grown(path, cut, anchor + end.curve(np.arange(1, number + 1) / number * tip), path[run])
+    ahead = _between(points, direction, end.curve(np.arange(1, number + 1) / number * tip))
+    return _Grown(path, cut, anchor + ahead, path[run])
+
+
+def _between(points: np.ndarray, direction: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Places (k, 3) no farther aside, across a direction, than points (n, 3) and the origin are."""
+    across = plane_axes(direction[None])[0]
+    flat = points @ across
+    across = across @ np.linalg.svd(flat - flat.mean(axis=0), full_matrices=False)[2].T
+    low, high = box(np.concatenate([points @ across, np.zeros((1, 2))]))
+    aside = places @ across
+    return places + (np.clip(aside, low, high) - aside) @ across.T
 
 
 def _last(cloud: VertexPoints, path: np.ndarray, along: np.ndarray, first: int, other: bool) -> int:
