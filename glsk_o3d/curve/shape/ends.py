@@ -14,7 +14,6 @@ from ...geometry.neighbourhoods import plane_axes
 from ...geometry.numbers import derived, fitted, measured
 from ...geometry.polylines import arc_lengths, place_at
 from ...geometry.vectors import TINY, Floats, box, cross, dot, norm, unit
-from ..axis.fit import axis_box
 from ..axis.sections import VertexPoints
 from ..curve import Curve
 from ..numbers import CURVE
@@ -327,10 +326,8 @@ def _replanted(curve: Curve, grown: list[_Grown]) -> Curve:
     m = len(curve.vertices)
     members = Members(curve.vertex_of_point, m)  # those without a normal, too
     keep, owner = np.ones(m, bool), curve.vertex_of_point.copy()
-    low, high = axis_box(curve.points[curve.supporting_points])
     edges, known = [curve.edges], {name: [getattr(curve, name)] for name in ("radii", "confidence")}
-    planted = [np.clip(end.places, low, high) for end in grown]
-    for (path, cut, _, run), places in zip(grown, planted, strict=True):
+    for path, cut, places, run in grown:
         gone, names = path[cut:], m + np.arange(len(places))
         m += len(places)
         keep[gone] = False
@@ -344,7 +341,7 @@ def _replanted(curve: Curve, grown: list[_Grown]) -> Curve:
     keep = np.concatenate([keep, np.ones(m - len(keep), bool)])
     number, links = np.cumsum(keep) - 1, np.concatenate(edges)
     links = number[links[keep[links].all(axis=1)]]
-    known["vertices"] = [curve.vertices, *planted]
+    known["vertices"] = [curve.vertices, *(end.places for end in grown)]
     of_vertices = {name: np.concatenate(values)[keep] for name, values in known.items()}
     replanted = curve.rewired(links, **of_vertices, vertex_of_point=np.append(number, -1)[owner])
     section = replanted.sections.radius
