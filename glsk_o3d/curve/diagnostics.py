@@ -147,7 +147,8 @@ def _close_calls(curve: Curve) -> list[Reason]:
 
 def _opened_loops(curve: Curve) -> list[Reason]:
     """A graph without loops, made by request of an object that probably has some, for the number of its ends."""
-    closed = [call for call in curve.report.decisions if call.about == "loop" and call.changed]
+    rooted = bool(curve.report.root)  # a Tracer has opened them
+    closed = [call for call in curve.report.decisions if call.about == "loop" and (call.changed or rooted)]
     handles = [call for call in closed if call.probability > 0.5 and not call.is_uncertain]
     if curve.n_loops or len(handles) <= WARN.opened * len(curve.leaves):
         return []

@@ -42,7 +42,7 @@ class MedialGraph(NamedTuple):
     """A curve on a medial axis."""
 
     places: np.ndarray  # (p, 3)
-    radii: np.ndarray  # (p,) of the inscribed balls
+    radii: np.ndarray  # (p,) of the balls inscribed there before the curve was smoothed
     edges: np.ndarray  # (e, 2)
     genus: int  # of the surface: handles of the solid
 

@@ -44,7 +44,8 @@ class Changeable:
 def forget(value: Any, field: str) -> None:
     """Let an instance compute anew what depends on a field."""
     for name in [*vars(value)]:
-        if field in getattr(getattr(type(value), name, None), "fields", ()):
+        fact = getattr(type(value), name, None)
+        if isinstance(fact, Derived) and field in fact.fields:
             del vars(value)[name]
 
 

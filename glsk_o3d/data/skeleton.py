@@ -115,6 +115,8 @@ class Skeleton(SpaceCurve):
         other = copy(self)  # what was checked need not be checked again
         object.__setattr__(other, "report", report)
         forget(other, "report")
+        if self.whole is not self:
+            vars(other)["_whole"] = self.whole.with_report(report)
         return other
 
     def __repr__(self) -> str:

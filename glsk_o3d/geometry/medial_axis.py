@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import Delaunay
 
 from .numbers import derived, precision, speed
-from .solver import factorised
+from .solver import solve_contraction
 from .vectors import TINY, dot, norm
 
 
@@ -23,7 +23,8 @@ class MedialNumbers:
 
     limb: float = derived(1.5, "half widths from the curve where a limb begins: corners of square sections are at 1.41")
     flat: float = precision(1e-12, "of the product of its edges: volume of a tetrahedron that has no circumsphere")
-    least_apart: float = precision(1e-2, "of the mean: places of the curve nearer than that count as so far apart")
+    least_apart: float = precision(1e-2, "of a length to smooth over: edges shorter than that count as that long")
+    rounds: int = precision(3, "solves, each along the curve of the one before")
     chunk: int = speed(64, "places at a time whose distances from all points are computed")
 
 
@@ -211,9 +212,10 @@ class _Fire:
 
 
 def medial_curve(axis: MedialAxis, burnt: Burnt, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Edges (m, 2) of the curve on a medial axis: loops, what joins them, and a way from every limb; and half widths.
+    """The curve on a medial axis, as edges (m, 2), and the half width (p,) of the solid at each place.
 
-    The half width (p,) of the solid at each place is that across the curve, or of the ball there if that is larger.
+    The curve is loops, what joins them, and a way from every limb. The half width is that across the curve, or of the
+    ball there if that is larger.
 
     `points` (n, 3) are those on the surface. Where one is farther from the curve than one and a half times the half
     width of the solid there, a limb begins: the way of the fire from the pole of the farthest becomes part of the
@@ -238,23 +240,24 @@ def medial_curve(axis: MedialAxis, burnt: Burnt, points: np.ndarray) -> tuple[np
 
 
 def without_waves(places: np.ndarray, edges: np.ndarray, length: np.ndarray) -> np.ndarray:
-    r"""Places (p, 3) of a graph without waves along it that are shorter than a `length` (p,) at each; all have edges.
+    r"""Places (p, 3) of a graph without waves along it that are shorter than a `length` (p,), more than 0, at each.
 
-    They are the least of :math:`\int |x - p|^2 + (\ell / 2 \pi)^4 |x''|^2` along the edges, as a smoothing spline is
-    (Reinsch 1967): waves of this length keep half their height, those of half the length a 17th. Ends have no second
-    derivative; elsewhere it is the Laplacian over the edges.
+    They minimise :math:`\int |x - p|^2 + (\ell / 2 \pi)^4 |x''|^2` along the edges, as a smoothing spline does (Reinsch
+    1967): waves of this length keep half their height, those of half the length a 17th. The second derivative is the
+    Laplacian over the edges, at ends none. Every place has an edge. A zigzag is longer than the curve in its middle, so
+    that lengths are measured anew along the answer.
     """
-    n, m, (a, b) = len(places), len(edges), edges.T
-    apart = norm(places[a] - places[b])
-    apart = np.maximum(apart, MEDIAL.least_apart * apart.mean())
-    stiffness = (length[a] ** 2 + length[b] ** 2) / (8 * np.pi**2 * apart)
-    difference = csr_array((np.tile([1.0, -1.0], m), edges.ravel(), 2 * np.arange(m + 1)), shape=(m, n))
-    mass = np.abs(difference).T @ apart / 2
-    laplacian = difference.T @ diags_array(stiffness) @ difference
-    bent = diags_array((np.bincount(edges.ravel(), minlength=n) > 1) / mass)
-    smooth = factorised((diags_array(mass) + laplacian.T @ bent @ laplacian).tocsc())
-    moved: np.ndarray = smooth.solve(mass[:, None] * places)
-    return moved
+    n, (a, b) = len(places), edges.T
+    least = MEDIAL.least_apart * (length[a] + length[b]) / 2
+    difference = csr_array((np.tile([1.0, -1.0], len(edges)), edges.ravel(), 2 * np.arange(len(edges) + 1)))
+    bend = np.where(np.bincount(edges.ravel()) > 1, (length / (2 * np.pi)) ** 2, 0)
+    smooth = places
+    for _ in range(MEDIAL.rounds):
+        apart = np.maximum(norm(smooth[a] - smooth[b]), least)
+        weight = np.sqrt(np.bincount(edges.ravel(), np.repeat(apart / 2, 2), n))
+        laplacian = difference.T @ diags_array(1 / apart) @ difference
+        smooth, _ = solve_contraction(laplacian, bend / weight, weight, places)
+    return smooth
 
 
 def _latest(axis: MedialAxis, burnt: Burnt) -> np.ndarray:

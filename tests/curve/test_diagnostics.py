@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glsk_o3d import Decision, Report, Skeleton
+from glsk_o3d import Decision, Report, Skeleton, samples, skeletonize
 
 
 def sheet(n):
@@ -99,10 +99,16 @@ def test_a_tree_of_what_has_loops_is_doubted(refine):
     path = skeleton_of(torus(1600))
     ring, star = (replace(path, edges=edges) for edges in ([*path.edges, [0, 11]], [[0, i] for i in range(1, 12)]))
     cases = (path, 0.95, True), (path, 0.95, False), (ring, 0.95, True), (path, 0.7, True), (star, 1.0, True)
-    for number, (skeleton, probability, closed) in enumerate(cases):
+    for number, (skeleton, probability, closed) in enumerate([*cases, (path, 0.05, True)]):
         call = replace(CALLS[0], probability=probability, changed=closed)
         reasons = refine(skeleton.with_report(Report(decisions=(call,)))).reasons
         assert ("opened loops" in {reason.code for reason in reasons}) == (number == 0)
+
+
+@pytest.mark.filterwarnings("ignore:opened loops")
+def test_loops_that_a_root_opens_are_doubted():
+    grown = skeletonize(samples.torus(1500).points, root="x")
+    assert (grown.n_loops, [reason.code for reason in grown.reasons]) == (0, ["opened loops"])
 
 
 @pytest.mark.parametrize(

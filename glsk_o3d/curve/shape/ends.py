@@ -58,8 +58,8 @@ def regrow_ends(curve: Curve, to_surface: bool = False) -> Curve:
     with p and its length s along t seen from the last vertex left. A point whose plane passes the curve by half a
     radius counts half, and those beyond the reach do not count. The fit is made three times, each along t + d of the
     one before. See `_End.tip` and `_End._cap` for where it stops, which may also be where the axis comes `to_surface`.
-    No end goes beyond its points, nor farther aside than these are: normals of walls that slope, as of a pan, meet far
-    in front of its mouth.
+    No end is farther aside than its points: normals of walls that slope, as of a pan, meet far in front of its mouth,
+    where the fit would lead.
 
     New vertices come behind all others, with the confidence of the run behind and the radii of their own sections.
     Points of a vertex that was cut belong to the nearest one of the same end. Loops and vertices without edges stay.
@@ -144,10 +144,10 @@ def _grow(curve: Curve, path: np.ndarray, first: int, other: bool, to_surface: b
 
 
 def _between(points: np.ndarray, direction: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Places (k, 3) no farther aside, across a direction, than points (n, 3) and the origin are."""
+    """Places (k, 3) in the box around points (n, 3) and the origin across a direction, along their principal axes."""
     across = plane_axes(direction[None])[0]
-    flat = points @ across
-    across = across @ np.linalg.svd(flat - flat.mean(axis=0), full_matrices=False)[2].T
+    flat = (points - points.mean(axis=0)) @ across
+    across = across @ np.linalg.eigh(flat.T @ flat)[1]
     low, high = box(np.concatenate([points @ across, np.zeros((1, 2))]))
     aside = places @ across
     return places + (np.clip(aside, low, high) - aside) @ across.T
