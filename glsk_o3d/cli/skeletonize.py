@@ -121,6 +121,8 @@ def _shown(facts: Mapping[str, Any], skeleton: Skeleton) -> dict[str, Any]:
     hidden |= {"sampled"} if not report.is_sampled else set()
     hidden |= {"contracted"} if facts["contracted"] == facts["distinct"] else set()
     shown = {name: value for name, value in facts.items() if name not in hidden and (name in graph or value)}
+    codes = ", ".join(reason.code for reason in skeleton.reasons)
+    shown["verdict"] = f"{facts['verdict']}: {codes}" if codes else facts["verdict"]
     shown["reasons"] = [text for text in facts["reasons"] if text not in report.warnings]  # those are on stderr
     shown["uncertain"] = [f"{call}; if that is wrong: --set {call.otherwise}" for call in report.uncertain]
     if report.n_draws:

@@ -89,8 +89,15 @@ def _by_component(curve: Curve) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return component, size, curve.cloud.points - curve.vertices[0]
 
 
+def _is_tree(curve: Curve) -> np.ndarray:
+    """Which components have no loop to go round, (c,) bool array."""
+    n = curve.n_components
+    edges = np.bincount(curve.component_of_vertex[curve.edges[:, 0]], minlength=n)
+    return edges < np.bincount(curve.component_of_vertex, minlength=n)
+
+
 def _ball(curve: Curve) -> Reason | None:
-    """The normal lines of components with most of the points meet in one point."""
+    """The normal lines of components with most of the points meet in one point, and they have no loop."""
     cloud, n = curve.cloud, curve.n_components
     component, size, points = _by_component(curve)
     along = np.einsum("ni,nj->nij", cloud.normals, cloud.normals)
@@ -103,7 +110,7 @@ def _ball(curve: Curve) -> Reason | None:
     distance = dot(offset, offset)
     miss = distance - dot(cloud.normals, offset) ** 2
     spread = group_sum(np.column_stack([miss, distance]), component, n)
-    ball = spread[:, 0] < WARN.ball_spread**2 * spread[:, 1]
+    ball = _is_tree(curve) & (spread[:, 0] < WARN.ball_spread**2 * spread[:, 1])
     share = float(size[ball].sum() / len(cloud.vertex))
     text = (
         f"sphere-like: the normals of parts with {share:.0%} of the points meet in one point, "
@@ -121,9 +128,7 @@ def _stubs(curve: Curve) -> Reason | None:
     spread = group_sum(products, component, n) / np.maximum(size, 1)[:, :, None] - mean[:, :, None] * mean[:, None]
     length = np.sqrt(12 * np.maximum(np.linalg.eigvalsh(spread)[:, 2], 0))
     reach = group_median(norm(cloud.offset), component, n)
-    edges = np.bincount(curve.component_of_vertex[curve.edges[:, 0]], minlength=n)
-    is_tree = edges < np.bincount(curve.component_of_vertex, minlength=n)
-    share = float(size[is_tree & (length < CURVE.stub * reach)].sum() / len(cloud.vertex))
+    share = float(size[_is_tree(curve) & (length < CURVE.stub * reach)].sum() / len(cloud.vertex))
     text = (
         f"sphere-like: parts with {share:.0%} of the points are hardly longer than thick, as balls, bowls and boxes "
         "are, so no curve skeleton is meaningful there; only limbs and handles on them may be right"

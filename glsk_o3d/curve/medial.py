@@ -31,7 +31,6 @@ class ClosedNumbers:
     enough: int = fitted(
         2000, "points from which a patch is seen; in fewer it must be larger, as contraction oversteps"
     )
-    most_shut: float = fitted(0.2, "share of a surface that can be walls of shut holes; where more is, signs are wrong")
 
 
 CLOSED = ClosedNumbers()
@@ -130,7 +129,7 @@ class OrientedSurface:
         sums = group_sum(self.areas[:, None] * self.outward, self.piece, self.piece.max() + 1)
         openness = norm(sums).sum() / self.areas.sum()
         turned = CLOSED.turned * np.clip(self.noise / CLOSED.noisy, CLOSED.least_turned, 1)
-        return bool(openness < CLOSED.open and self.turned < turned and self.shut < CLOSED.most_shut)
+        return bool(openness < CLOSED.open and self.turned < turned)
 
     def has_shut(self, share: float) -> bool:
         """Whether it is closed and at least this share of it, of few points more, is walls of holes that were shut."""

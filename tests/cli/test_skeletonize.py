@@ -78,8 +78,12 @@ def test_a_doubtful_verdict_is_printed_with_its_reasons(invoke, scans, tmp_path,
     (reason,) = json.loads(invoke(*words, "--json", "--report", "r.html").stdout)["reasons"]
     assert reason.startswith("low score")
     assert f"<li>{reason}</li>" in (tmp_path / "r.html").read_text("utf-8")
-    assert re.search(rf"^reasons +{re.escape(reason)}$", invoke(*words).stdout, re.MULTILINE)
-    assert "sphere-like" not in invoke("skeletonize", scans / "ball.ply", "-o", "s.ply").stdout  # it is on stderr
+    printed = invoke(*words).stdout
+    assert re.search(rf"^reasons +{re.escape(reason)}$", printed, re.MULTILINE)
+    assert re.search(r"^verdict +doubtful: low score$", printed, re.MULTILINE)
+    printed = invoke("skeletonize", scans / "ball.ply", "-o", "s.ply").stdout
+    assert re.search(r"^verdict +no curve skeleton: sphere, low score$", printed, re.MULTILINE)
+    assert "sphere-like" not in printed  # it is on stderr
 
 
 # ------------------------------------------------------------------------------------------------ results as recipes

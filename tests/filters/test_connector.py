@@ -146,6 +146,29 @@ def test_where_contraction_shuts_a_hole_the_graph_is_on_the_medial_axis(assert_s
         assert Refiner(handle=1)(opened).n_loops == 0
 
 
+def ring(inner, outer, high, seed, n=4000):
+    """Points on a ring around z that is bored through: two walls and two faces."""
+    rng = np.random.default_rng(seed)
+    face = np.pi * (outer**2 - inner**2)
+    area = np.array([2 * np.pi * inner * high, 2 * np.pi * outer * high, face, face])
+    part, u, turn = rng.choice(4, n, p=area / area.sum()), rng.random(n), rng.uniform(0, 2 * np.pi, n)
+    across = np.sqrt(inner**2 + u * (outer**2 - inner**2))
+    radius, z = np.choose(part, [inner, outer, across, across]), np.choose(part, [high * u, high * u, 0, high])
+    out = np.column_stack([np.cos(turn), np.sin(turn), 0 * turn])
+    return radius[:, None] * out + z[:, None] * [0, 0, 1]
+
+
+@pytest.mark.filterwarnings("ignore::glsk_o3d.SkeletonWarning")
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize(("outer", "high"), [(0.4, 0.6), (0.4, 0.8), (0.44, 0.8), (0.5, 0.8), (0.6, 0.8)])
+def test_a_wide_bore_is_a_loop(outer, high, seed):
+    """A tape roll, a bush: as high as the bore is wide, so that contraction shuts it; walls may be a fourth of all."""
+    skeleton = skeletonize(ring(0.3, outer, high, seed))
+    assert (skeleton.n_components, skeleton.n_loops, len(skeleton.leaves)) == (1, 1, 0)
+    assert skeleton.length == pytest.approx(np.pi * (0.3 + outer), rel=0.05)
+    assert skeleton.verdict >= "doubtful"
+
+
 def block(centres, seed, n=8192, noise=0.05):
     """A block of 80 x 24 x 20 with round holes of radius 3 along z."""
     rng = np.random.default_rng(seed)
