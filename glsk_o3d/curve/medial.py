@@ -31,6 +31,7 @@ class ClosedNumbers:
     enough: int = fitted(
         2000, "points from which a patch is seen; in fewer it must be larger, as contraction oversteps"
     )
+    most_shut: float = fitted(0.2, "share of it facing from which the solid must confirm: signs may be wrong")
 
 
 CLOSED = ClosedNumbers()
@@ -134,6 +135,10 @@ class OrientedSurface:
     def has_shut(self, share: float) -> bool:
         """Whether it is closed and at least this share of it, of few points more, is walls of holes that were shut."""
         return self.is_closed and self.shut * min(len(self.points) / CLOSED.enough, 1) >= share
+
+    def confirms(self, graph: MedialGraph) -> bool:
+        """Whether the curve on the medial axis is to be believed: where much faces the curve, only if it is sound."""
+        return graph.is_sound or self.shut < CLOSED.most_shut
 
     def medial_graph(self) -> MedialGraph:
         """The curves on the medial axes of the closed surfaces through the points of each piece.

@@ -109,6 +109,8 @@ class Connector(Filter[Contraction, Skeleton]):
             curve = surface.medial_graph()
         except InvalidCloudError:  # a piece has too few points
             return contracted
+        if not surface.confirms(curve):
+            return contracted
         balls = np.maximum(radius, self.thickness * curve.radii)
         part, edges = curve.merged(farthest_point_sampling(curve.places, balls)[1])
         mean = group_sum(np.column_stack([curve.places, curve.radii]), part, part.max() + 1)

@@ -81,3 +81,11 @@ def test_where_no_surface_goes_through_points_there_is_an_error():
         points = rng.normal(size=(n, 3))
         with pytest.raises(InvalidCloudError, match=f"{n} points are too few"):
             MedialGraph.of(points, points / np.linalg.norm(points, axis=1)[:, None])
+
+
+@pytest.mark.parametrize(("shut", "genus_", "believed"), [(0.1, 2, True), (0.3, 2, False), (0.3, 1, True)])
+def test_where_much_faces_the_curve_only_the_genus_confirms_it(shut, genus_, believed):
+    ring = MedialGraph(np.eye(3), np.ones(3), np.array([[0, 1], [1, 2], [0, 2]]), genus_)
+    points = np.zeros((3, 3))
+    surface = OrientedSurface(points, points, np.ones(3), np.zeros(3, int), noise=0.0, shut=shut, turned=0.0)
+    assert surface.confirms(ring) == believed
