@@ -75,9 +75,9 @@ class TestTables:
         assert first.shapes == 3
         assert first.means == pytest.approx([0.1, 0.2])
         ours[0]["perfect"] = 0.0
-        ranks = board.ranked(here)
-        assert [it["ours"] for it in ranks] == pytest.approx([2 / 3, 5 / 6])  # CGAL is perfect in all of its own
-        ranks.reverse()
+        ranks = board.ranked(here)[::-1]
+        assert [line[2] for line in board.both(ranks, ranks, {})[2]] == ["0.83 [0.50, 1.00]", "1.00 [1.00, 1.00] of 3"]
+        assert [line[1] for line in board.short(ranks, [*ranks], {})[2]] == ["1.00", "0.50 of 3"]
         assert [line[-3] for line in board.overview(ranks, {}, "tubes")[2]] == ["6", "3"]
         _, _, (whole, some) = board.by_group(here, "variant", "tubes")
         assert whole == ["`default`", "points", "1.00 / 0.83 / 0.55"]
@@ -93,9 +93,7 @@ class TestTables:
         assert lines[0] == [
             "`default`",
             "points",
-            "1",
             one,
-            "1.00",
             one,
             "1.00",
             "0.20",
@@ -105,14 +103,14 @@ class TestTables:
             "-",
             "-",
         ]
-        assert lines[1][6:] == ["1.00", "0.30", "0.00", "0.00", "-", "1", "1.50", "80"]
-        assert lines[2][8:11] == ["-", "-", "-"]
+        assert lines[1][4:] == ["1.00", "0.30", "0.00", "0.00", "-", "1", "1.50", "80"]
+        assert lines[2][6:9] == ["-", "-", "-"]
         *_, lines = board.both(ranks[0][:1], ranks[1], spent)
-        assert lines[1][:9] == ["CGAL", "coarser wrap; tubes: wrap", *["-"] * 6, "0.00"]
+        assert lines[1][:7] == ["CGAL", "coarser wrap; tubes: wrap", *["-"] * 4, "0.00"]
         *_, lines = board.short(*ranks, spent)
-        assert lines[0] == ["`default`", "1", "1.00", "1.00", "0.20", "1", "1.00", "1.00", "0.10", "-"]
-        assert lines[1] == ["CGAL", "1", "1.00", "0.00", "0.30", "1", "0.00", "0.00", "-", "1.50"]
-        assert lines[2] == ["scikit-image", "1", "1.00", "0.00", "0.10", "-", "-", "-", "-", "-"]
+        assert lines[0] == ["`default`", "1.00", "1.00", "0.20", "1.00", "1.00", "0.10", "-"]
+        assert lines[1] == ["CGAL", "1.00", "0.00", "0.30", "0.00", "0.00", "-", "1.50"]
+        assert lines[2] == ["scikit-image", "1.00", "0.00", "0.10", "-", "-", "-", "-"]
 
     def test_failures_are_counted_by_reason_and_variant(self):
         rows = [row(variant=it, failure=f"no answer: not done after {n} s") for it, n in (("a", 3), ("b", 9), ("b", 5))]

@@ -6,7 +6,6 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import product
-from operator import itemgetter
 from pathlib import Path
 from statistics import fmean
 from typing import Any, NamedTuple
@@ -54,7 +53,6 @@ NUMBER = re.compile(r"(?<!code )(?<!signal )\d+(?:\.\d+)?")  # of a reason; thos
 VIEW = (14, -60)  # elevation and azimuth, in degrees
 SPREAD = ("moved", "agree", "loops", "ends")  # of several clouds of an object, with intervals
 
-PERFECT = itemgetter("shape", "variant", "perfect")
 
 Seconds = dict[str, dict[str, Any]]
 
@@ -155,15 +153,8 @@ def recorded() -> Table:
 
 
 def ranked(entries: Sequence[Entry]) -> list[dict[str, Any]]:
-    """The entries of a `Leaderboard`, of which some may have a part of the clouds; the best first.
-
-    Each also has `ours`, the share of its clouds in which `default` is perfect.
-    """
-    ours = {it[:2]: it[2] for entry in entries if entry.tool == OURS for it in map(PERFECT, entry.results.rows)}
-    rows = []
-    for entry in entries:
-        known = [ours[it[:2]] for it in map(PERFECT, entry.results.rows) if it[:2] in ours]
-        rows.append(leaderboard([entry.results]).entries[0] | {"ours": fmean(known) if known else None})
+    """The entries of a `Leaderboard`, of which some may have a part of the clouds; the best first."""
+    rows = [leaderboard([entry.results]).entries[0] for entry in entries]
     return sorted(rows, key=lambda row: [-row["all"][measure][0] for measure in ("perfect", "topology")])
 
 
@@ -189,12 +180,12 @@ def both(things: Sequence[dict[str, Any]], tubes: Sequence[dict[str, Any]], cpu:
     of_things, of_tubes = ({entry["name"]: entry for entry in board} for board in (things, tubes))
     lines = []
     for name in {**of_things, **of_tubes}:
-        cells = ["-"] * 6
+        cells = ["-"] * 4
         if entry := of_things.get(name):
             mean = entry["all"]
-            shares = [told(*mean["perfect"]), number(entry["ours"], 2), told(*mean["topology"])]
-            rest = [number(mean[measure] and mean[measure][0], 2) for measure in ("tips_f1", "error")]
-            cells = [str(mean["clouds"]), *shares, *rest]
+            shares = [told(*mean["perfect"]), told(*mean["topology"])]
+            cells = [*shares, *(number(mean[measure] and mean[measure][0], 2) for measure in ("tips_f1", "error"))]
+            cells[0] += _part(things, mean)
         here = [board[name]["all"] for board in (of_things, of_tubes) if name in board]
         there = of_tubes[name]["all"] if name in of_tubes else {}
         cells += [number((there.get(it) or [None])[0], 2) for it in ("perfect", "topology", "error")]
@@ -202,8 +193,7 @@ def both(things: Sequence[dict[str, Any]], tubes: Sequence[dict[str, Any]], cpu:
         label, takes = _label(name, "things")
         on_tubes = _label(name, "tubes")[1]
         lines.append([label, takes if takes == on_tubes else f"{takes}; tubes: {on_tubes}", *cells])
-    heads = ["things", "perfect", "`default` there", "topology", "tips F1", "error"]
-    heads += ["tubes: perfect", "topology", "error"]
+    heads = ["things: perfect", "topology", "tips F1", "error", "tubes: perfect", "topology", "error"]
     title = f"things: {_size(things)}; tubes: {_size(tubes)}"
     return title, ["", "takes", *heads, "failures", "CPU s", "MB"], lines
 
@@ -217,14 +207,19 @@ def short(things: Sequence[dict[str, Any]], tubes: Sequence[dict[str, Any]], cpu
         for entry in board:
             mean = entry["all"]
             shares = [number(mean[it] and mean[it][0], 2) for it in ("topology", "perfect", "error")]
-            best.setdefault(_tool(entry["name"]), [str(mean["clouds"]), *shares])
+            best.setdefault(_tool(entry["name"]), [shares[0] + _part(board, mean), *shares[1:]])
             spent.setdefault(_tool(entry["name"]), _fact(cpu, entry["name"], "cpu", 2))
         for tool in {**cells, **best}:
-            done = cells.setdefault(tool, ["-"] * 4 if board is tubes else [])
-            done += best.get(tool, ["-"] * 4)
-    heads = [head for kind in ("things", "tubes") for head in (kind, "topology", "perfect", "error")]
+            done = cells.setdefault(tool, ["-"] * 3 if board is tubes else [])
+            done += best.get(tool, ["-"] * 3)
+    heads = [head for kind in ("things", "tubes") for head in (f"{kind}: topology", "perfect", "error")]
     lines = [[tool, *row, spent[tool]] for tool, row in cells.items()]
     return f"things: {_size(things)}; tubes: {_size(tubes)}", ["", *heads, "CPU s"], lines
+
+
+def _part(board: Sequence[dict[str, Any]], mean: Mapping[str, Any]) -> str:
+    """How many clouds a mean is of, if others of the board are of more."""
+    return f" of {mean['clouds']}" if mean["clouds"] < max(entry["all"]["clouds"] for entry in board) else ""
 
 
 def _size(board: Sequence[dict[str, Any]]) -> str:
