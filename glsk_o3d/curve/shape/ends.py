@@ -14,6 +14,7 @@ from ...geometry.neighbourhoods import plane_axes
 from ...geometry.numbers import derived, fitted, measured
 from ...geometry.polylines import arc_lengths, place_at
 from ...geometry.vectors import TINY, Floats, box, cross, dot, norm, unit
+from ..axis.fit import axis_box
 from ..axis.sections import VertexPoints
 from ..curve import Curve
 from ..numbers import CURVE
@@ -58,8 +59,8 @@ def regrow_ends(curve: Curve, to_surface: bool = False) -> Curve:
     with p and its length s along t seen from the last vertex left. A point whose plane passes the curve by half a
     radius counts half, and those beyond the reach do not count. The fit is made three times, each along t + d of the
     one before. See `_End.tip` and `_End._cap` for where it stops, which may also be where the axis comes `to_surface`.
-    No end is farther aside than its points: normals of walls that slope, as of a pan, meet far in front of its mouth,
-    where the fit would lead.
+    No end is out of the box around all points, nor farther aside than its own: normals of walls that slope, as of a
+    pan, meet far in front of its mouth, where the fit would lead.
 
     New vertices come behind all others, with the confidence of the run behind and the radii of their own sections.
     Points of a vertex that was cut belong to the nearest one of the same end. Loops and vertices without edges stay.
@@ -326,8 +327,10 @@ def _replanted(curve: Curve, grown: list[_Grown]) -> Curve:
     m = len(curve.vertices)
     members = Members(curve.vertex_of_point, m)  # those without a normal, too
     keep, owner = np.ones(m, bool), curve.vertex_of_point.copy()
+    low, high = axis_box(curve.points[curve.supporting_points])
     edges, known = [curve.edges], {name: [getattr(curve, name)] for name in ("radii", "confidence")}
-    for path, cut, places, run in grown:
+    planted = [np.clip(end.places, low, high) for end in grown]
+    for (path, cut, _, run), places in zip(grown, planted, strict=True):
         gone, names = path[cut:], m + np.arange(len(places))
         m += len(places)
         keep[gone] = False
@@ -341,7 +344,7 @@ def _replanted(curve: Curve, grown: list[_Grown]) -> Curve:
     keep = np.concatenate([keep, np.ones(m - len(keep), bool)])
     number, links = np.cumsum(keep) - 1, np.concatenate(edges)
     links = number[links[keep[links].all(axis=1)]]
-    known["vertices"] = [curve.vertices, *(end.places for end in grown)]
+    known["vertices"] = [curve.vertices, *planted]
     of_vertices = {name: np.concatenate(values)[keep] for name, values in known.items()}
     replanted = curve.rewired(links, **of_vertices, vertex_of_point=np.append(number, -1)[owner])
     section = replanted.sections.radius
