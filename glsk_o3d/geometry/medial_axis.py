@@ -247,14 +247,14 @@ def without_waves(places: np.ndarray, edges: np.ndarray, length: np.ndarray) -> 
     Laplacian over the edges, at ends none. Every place has an edge. A zigzag is longer than the curve in its middle, so
     that lengths are measured anew along the answer.
     """
-    n, (a, b) = len(places), edges.T
+    a, b = edges.T
     least = MEDIAL.least_apart * (length[a] + length[b]) / 2
     difference = csr_array((np.tile([1.0, -1.0], len(edges)), edges.ravel(), 2 * np.arange(len(edges) + 1)))
     bend = np.where(np.bincount(edges.ravel()) > 1, (length / (2 * np.pi)) ** 2, 0)
     smooth = places
     for _ in range(MEDIAL.rounds):
         apart = np.maximum(norm(smooth[a] - smooth[b]), least)
-        weight = np.sqrt(np.bincount(edges.ravel(), np.repeat(apart / 2, 2), n))
+        weight = np.sqrt(np.bincount(edges.ravel(), np.repeat(apart / 2, 2)))
         laplacian = difference.T @ diags_array(1 / apart) @ difference
         smooth, _ = solve_contraction(laplacian, bend / weight, weight, places)
     return smooth

@@ -53,7 +53,6 @@ NUMBER = re.compile(r"(?<!code )(?<!signal )\d+(?:\.\d+)?")  # of a reason; thos
 VIEW = (14, -60)  # elevation and azimuth, in degrees
 SPREAD = ("moved", "agree", "loops", "ends")  # of several clouds of an object, with intervals
 
-
 Seconds = dict[str, dict[str, Any]]
 
 
